@@ -1,5 +1,5 @@
-//! Tells the tests what is there that they are to be run on: photographs, and other programs. What is not is reported
-//! as an ignored test with its reason.
+//! Sets a `cfg` for each optional resource of the tests: photographs and other programs. A test whose resource is
+//! missing is reported as ignored, with the reason.
 
 use std::env::{consts::EXE_SUFFIX, split_paths, var_os};
 use std::path::{Path, PathBuf};

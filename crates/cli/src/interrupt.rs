@@ -1,4 +1,4 @@
-//! Ctrl-C, and being told to end: a flag that long work looks at, and a way out for work that does not.
+//! Ctrl-C and termination signals: a flag that long work checks, and a way out of work that does not.
 
 use std::borrow::Cow;
 use std::io::Write;
@@ -10,10 +10,10 @@ use crate::output::tell;
 use deltille::export::atomic;
 use deltille_core::words::shown;
 
-/// How long work may take to come to its own end after the signal; then it is left as it stands.
+/// Time that work has to end on its own after a signal, before the process exits.
 const PATIENCE: Duration = Duration::from_millis(300);
 
-/// Exit codes of programs that a signal ends, as a shell has them: 128 and the signal's number.
+/// Offset of the exit code of a process ended by a signal, as in shells: 128 plus the signal number.
 const SIGNALLED: u8 = 128;
 #[cfg(unix)]
 const HANGUP: u8 = 1;
@@ -24,39 +24,39 @@ static SIGNAL: AtomicU8 = AtomicU8::new(INTERRUPT);
 static KEEPS: AtomicBool = AtomicBool::new(false);
 static STANDING: Mutex<Cow<'static, str>> = Mutex::new(Cow::Borrowed("the work was not finished"));
 
-/// The flag that becomes true with the first signal.
+/// Returns the flag that becomes true with the first signal.
 pub fn flag() -> &'static AtomicBool {
     &FLAG
 }
 
-/// Whether a signal has come.
+/// Whether a signal has arrived.
 pub fn is_raised() -> bool {
     FLAG.load(Ordering::Relaxed)
 }
 
-/// The exit code after the signal that came.
+/// Returns the exit code for the signal that arrived.
 pub fn exit_code() -> u8 {
     SIGNALLED + SIGNAL.load(Ordering::Relaxed)
 }
 
-/// From here on the work looks at the flag often and has something to keep: only a second signal
-/// makes it leave that.
+/// Declares that from now on the work checks the flag often and has results to keep, so that only a second signal
+/// aborts it.
 pub fn keeps_results() {
     KEEPS.store(true, Ordering::Relaxed);
 }
 
-/// What is to be said where the work is left from here on.
+/// Sets the status that is printed if the work is aborted from now on.
 pub fn stands(how: impl Into<Cow<'static, str>>) {
     *STANDING.lock().unwrap_or_else(PoisonError::into_inner) = how.into();
 }
 
-/// Ends the process: what it is writing is removed, and one line says how things stand.
+/// Ends the process: removes partially written files, and prints the status on one line.
 pub fn leave(how: Option<&str>) -> ! {
-    // Whoever comes second waits here for the end.
+    // A second caller waits here until the process ends.
     let _nothing_more = atomic::abandon();
     let standing = STANDING.lock().unwrap_or_else(PoisonError::into_inner);
     let how = shown(how.unwrap_or(&standing)).into_owned();
-    // The terminal may be what has gone away.
+    // The terminal may be gone.
     let _ = writeln!(std::io::stderr(), "interrupted: {how}");
     std::process::exit(exit_code().into())
 }
@@ -72,11 +72,11 @@ fn raise(signal: u8) {
             leave(None);
         }
         std::thread::sleep(6 * PATIENCE);
-        tell!("what was found is being written; a second signal leaves it");
+        tell!("writing the results; a second signal aborts");
     });
 }
 
-/// Begins to listen. Where that fails a signal ends the process at once, and the next run tidies up.
+/// Starts to listen for signals. If this fails, a signal ends the process immediately, and the next run cleans up.
 #[cfg(unix)]
 pub fn listen() {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -87,8 +87,8 @@ pub fn listen() {
     }
 }
 
-/// Whether the process was started with a signal ignored, as `nohup` does. Where the system does not
-/// tell, it is left alone.
+/// Whether the process was started with a signal ignored, as by `nohup`. If the system does not report it, the signal
+/// counts as ignored.
 #[cfg(unix)]
 fn ignores(signal: u8) -> bool {
     let Ok(status) = std::fs::read_to_string("/proc/self/status") else { return true };
@@ -97,7 +97,7 @@ fn ignores(signal: u8) -> bool {
     mask.is_none_or(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
-/// Begins to listen.
+/// Starts to listen for signals.
 #[cfg(not(unix))]
 pub fn listen() {
     let _ = ctrlc::set_handler(|| raise(INTERRUPT));

@@ -1,12 +1,12 @@
-//! The programs: arguments, progress, messages and exit codes. No algorithm lives here.
+//! The programs: arguments, progress, messages and exit codes. This crate contains no algorithms.
 //!
-//! 1. `run`: from the command line to an exit code; `values`: numbers and lengths of options;
+//! 1. `run`: from the command line to an exit code; `values`: parsers of option values;
 //! 2. `deltag`, `deltille`: the commands;
-//! 3. `wording`: names of options in messages; `output`: where lines and files go;
-//! 4. `progress`, `interrupt`: long work; `shell`: completions and manual pages.
+//! 3. `wording`: option names in messages; `output`: printed lines and written files;
+//! 4. `progress`, `interrupt`: support for long work; `shell`: completions and manual pages.
 
-#![allow(unreachable_pub, reason = "programs have no interface")]
-#![allow(clippy::missing_errors_doc, reason = "errors of programs are sentences for people")]
+#![allow(unreachable_pub, reason = "programs have no public interface")]
+#![allow(clippy::missing_errors_doc, reason = "errors of programs are messages for users")]
 
 pub mod deltag;
 pub mod deltille;

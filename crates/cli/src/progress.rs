@@ -1,4 +1,4 @@
-//! Progress on standard error: bars on a terminal, and of long searches a line now and then elsewhere.
+//! Progress on standard error: bars on a terminal; otherwise, occasional lines for long searches.
 
 use std::io::IsTerminal;
 use std::sync::Mutex;
@@ -11,8 +11,8 @@ use crate::output::tell;
 use deltille::family::Progress;
 use deltille_core::words::counted;
 
-/// A bar with position and estimate, for `total` units of work called `unit`; silent where standard
-/// error is not a terminal.
+/// Creates a bar with position and remaining time, for `total` units of work called `unit`; silent if standard error
+/// is not a terminal.
 pub fn bar(total: u64, unit: &str) -> ProgressBar {
     let position = if unit.is_empty() { String::new() } else { format!("{{human_pos}} {unit}  ") };
     let template = format!(
@@ -22,27 +22,27 @@ pub fn bar(total: u64, unit: &str) -> ProgressBar {
     ProgressBar::new(total).with_style(style)
 }
 
-/// A search for codes: a bar on a terminal, and a line every ten seconds elsewhere.
+/// Progress of a code search: a bar on a terminal, otherwise a line every ten seconds.
 pub struct SearchProgress {
     bar: ProgressBar,
-    /// The most codes of any attempt so far: the next one begins with few.
+    /// Largest number of codes of any attempt so far; each attempt starts with few.
     codes: AtomicUsize,
-    /// When the last line was written; `None` on a terminal.
+    /// Time of the last line; `None` on a terminal.
     last: Option<Mutex<Instant>>,
 }
 
 impl SearchProgress {
-    /// How often a line is written.
+    /// Interval between lines.
     const EVERY: Duration = Duration::from_secs(10);
 
-    /// Of `total` units of work called `unit`.
+    /// Creates a progress display for `total` units of work called `unit`.
     pub fn new(total: u64, unit: &str) -> Self {
         let is_terminal = std::io::stderr().is_terminal();
         let last = (!is_terminal).then(|| Mutex::new(Instant::now()));
         Self { bar: bar(total, unit), codes: AtomicUsize::new(0), last }
     }
 
-    /// Shows how far the search has come.
+    /// Shows the progress of the search.
     pub fn show(&self, progress: Progress) {
         let Progress { done, total, codes, .. } = progress;
         let before = self.codes.fetch_max(codes, Ordering::Relaxed);
@@ -59,7 +59,7 @@ impl SearchProgress {
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn end(self) {
         self.bar.finish_and_clear();
     }

@@ -1,4 +1,4 @@
-//! From a command's result to an exit code and one line on standard error.
+//! From the result of a command to an exit code and one line on standard error.
 
 use std::ffi::OsString;
 use std::io;
@@ -12,17 +12,17 @@ use crate::output::tell;
 use crate::{interrupt, wording};
 use deltille_core::words::{cut, shown, with_short_quotes};
 
-/// Exit code for bad input of every kind.
+/// Exit code for invalid input of any kind.
 pub const BAD_INPUT: u8 = 2;
-/// Exit code when what was checked does not hold, or some of many inputs failed.
+/// Exit code if a check failed, or some of many inputs failed.
 pub const FAILED: u8 = 1;
-/// Exit code when a verdict was asked for, and what it needs is not known.
+/// Exit code if a question could not be answered because necessary information is unknown.
 pub const UNDECIDED: u8 = 3;
 
-/// Characters kept of either end of a long message.
+/// Number of characters kept at either end of a long message.
 const MOST_CHARACTERS: usize = 1000;
 
-/// Ctrl-C or another signal came, and this is how things stand; see [`interrupt::leave`].
+/// Interruption by Ctrl-C or another signal, with the status of the work; see [`interrupt::leave`].
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct Interrupted(pub String);
@@ -32,12 +32,12 @@ pub fn run<A: Parser>(program: impl FnOnce(A) -> anyhow::Result<ExitCode>) -> Ex
     run_with(std::env::args_os().collect(), program)
 }
 
-/// The number of an exit code, for whoever ends the process in another way than by returning from `main`.
+/// Returns the number of an exit code, for callers that end the process without returning from `main`.
 pub fn number(code: ExitCode) -> u8 {
     (0..=u8::MAX).find(|&number| ExitCode::from(number) == code).unwrap_or(BAD_INPUT)
 }
 
-/// The same with given arguments, of which the first is the name of the program.
+/// Like [`run`], with given arguments; the first is the name of the program.
 pub fn run_with<A: Parser>(
     arguments: Vec<OsString>,
     program: impl FnOnce(A) -> anyhow::Result<ExitCode>,
@@ -53,10 +53,10 @@ pub fn run_with<A: Parser>(
         Ok(parsed) => program(parsed),
         Err(error) if error.use_stderr() => Err(anyhow::anyhow!(one_line(&error, &arguments))),
         Err(help_or_version) => {
-            // Nothing is left to say when the reader of the help text has gone away.
+            // If the reader of the help text is gone, there is nothing to report.
             match help_or_version.print() {
                 Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-                    Err(error).context("cannot write to the standard output")
+                    Err(error).context("cannot write to standard output")
                 }
                 _ => return ExitCode::SUCCESS,
             }
@@ -64,7 +64,7 @@ pub fn run_with<A: Parser>(
     };
     result.unwrap_or_else(|error| {
         if interrupt::is_raised() {
-            // Any other error has come of what is being torn down.
+            // Any other error is a consequence of the interruption.
             interrupt::leave(error.downcast_ref().map(|Interrupted(how)| how.as_str()));
         }
         report(&error);
@@ -77,8 +77,7 @@ pub fn report(error: &anyhow::Error) {
     tell!("error: {}", message(error));
 }
 
-/// An error and its causes on one line; a cause that the message above it tells already is left
-/// out.
+/// Returns an error and its causes on one line. Omits causes that are already part of the message.
 pub fn message(error: &anyhow::Error) -> String {
     let mut text = String::new();
     for cause in error.chain().map(ToString::to_string) {
@@ -91,8 +90,7 @@ pub fn message(error: &anyhow::Error) -> String {
     shortened(&with_short_quotes(&shown(&text.replace('\n', " "))))
 }
 
-/// A line without its middle where that is longer than anybody reads: messages name what they found
-/// in a file, whatever it is.
+/// Cuts the middle out of a line that is too long to read, because messages may quote arbitrary file content.
 fn shortened(line: &str) -> String {
     let count = line.chars().count();
     if count <= 2 * MOST_CHARACTERS {
@@ -103,7 +101,7 @@ fn shortened(line: &str) -> String {
     format!("{start} … {end}")
 }
 
-/// The first paragraph of a message of clap, and its tip, on one line.
+/// Returns the first paragraph of a clap message and its tip on one line.
 fn one_line(error: &clap::Error, arguments: &[OsString]) -> String {
     if error.kind() == ErrorKind::InvalidUtf8 {
         let arguments = (1..).zip(arguments.iter().skip(1));
@@ -117,7 +115,7 @@ fn one_line(error: &clap::Error, arguments: &[OsString]) -> String {
         (error.kind(), error.get(ContextKind::ValidSubcommand))
     {
         let commands = commands.join(", ");
-        return format!("a command is missing, one of {commands} (--help tells what they do)");
+        return format!("a command is missing: one of {commands} (see --help)");
     }
     let mut text = error.to_string();
     for (_, value) in error.context() {
@@ -132,6 +130,6 @@ fn one_line(error: &clap::Error, arguments: &[OsString]) -> String {
     let first = first.trim_start_matches("error: ").to_owned();
     match paragraphs.find(|paragraph| paragraph.starts_with("tip: ")) {
         Some(tip) => format!("{first} ({})", tip.trim_start_matches("tip: ")),
-        None => format!("{first} (--help tells more)"),
+        None => format!("{first} (see --help)"),
     }
 }

@@ -1,4 +1,4 @@
-//! What both programs have for shells: completions, and pages of the manual.
+//! Shell completions and manual pages of both programs.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -9,32 +9,32 @@ use clap::{Command, CommandFactory};
 use crate::output::{self, Overwrite, print, say};
 use deltille_core::words::counted;
 
-/// At the end of the help of `deltille completions`.
+/// Examples at the end of the help of `deltille completions`.
 pub const COMPLETIONS: &str = "Examples:
   deltille completions bash
   deltille completions zsh";
-/// At the end of the help of `deltille man`.
+/// Examples at the end of the help of `deltille man`.
 pub const MAN: &str = "Examples:
   deltille man -o man1";
 
 /// Arguments of `completions`.
 #[derive(clap::Args)]
 pub struct Completions {
-    /// The shell
+    /// Shell to generate completions for
     shell: clap_complete::Shell,
 }
 
 /// Arguments of `man`.
 #[derive(clap::Args)]
 pub struct Man {
-    /// Folder for the pages
+    /// Output folder
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
     #[command(flatten)]
     overwrite: Overwrite,
 }
 
-/// Prints what the shell reads to complete the words of a program.
+/// Prints the completion script of a program for a shell.
 pub fn completions<P: CommandFactory>(args: Completions) -> anyhow::Result<ExitCode> {
     let mut command = P::command();
     let name = command.get_name().to_owned();
@@ -44,7 +44,7 @@ pub fn completions<P: CommandFactory>(args: Completions) -> anyhow::Result<ExitC
     Ok(ExitCode::SUCCESS)
 }
 
-/// Writes a page of the manual for a program and for each of its commands.
+/// Writes a manual page for a program and for each of its commands.
 pub fn man<P: CommandFactory>(args: Man) -> anyhow::Result<ExitCode> {
     output::check_folder(&args.output).context("-o")?;
     let mut program = P::command();

@@ -1,14 +1,14 @@
-//! What the library calls its settings, in words of the command line.
+//! Names of library settings in terms of command-line options.
 //!
-//! Messages of the library name a [`Setting`]. Whoever runs a command sets it by an option: of the command that runs, or of
-//! one that has it.
+//! Messages of the library name a [`Setting`]. On the command line, it is an option of the running command, or of
+//! another command.
 
 use std::sync::OnceLock;
 
 use clap::{ArgMatches, Command};
 use deltille::setting::{self, Setting};
 
-/// A command that sets it, and how; a command without option is the whole answer.
+/// Returns a command that has the setting, and its option; the option is empty if the command itself is the answer.
 const fn named(setting: Setting) -> (&'static str, &'static str) {
     match setting {
         Setting::AprilGridGap => ("deltille aprilgrid", "--gap"),
@@ -101,27 +101,27 @@ const fn named(setting: Setting) -> (&'static str, &'static str) {
     }
 }
 
-/// The options of the command that runs.
+/// The options of the running command.
 static OPTIONS: OnceLock<Vec<String>> = OnceLock::new();
 
-/// From now on messages name settings by options; by those of the command that runs as soon as that is known, see [`runs`].
+/// Makes messages name settings by options: by those of the running command as soon as it is known, see [`runs`].
 pub fn speak() {
     setting::speak(|setting| told(setting, OPTIONS.get().map_or(&[], Vec::as_slice)));
 }
 
-/// Says which command of a program runs.
+/// Records which command of a program is running.
 pub fn runs(program: &Command, matches: &ArgMatches) {
     let (mut command, mut matches) = (program, matches);
     while let Some((name, inner)) = matches.subcommand() {
         let Some(found) = command.find_subcommand(name) else { break };
         (command, matches) = (found, inner);
     }
-    // Only one command runs in a process.
+    // Only one command runs per process.
     let _ = OPTIONS.set(options(command));
 }
 
-/// What a command is told by: its options with their dashes, under all their names, and other arguments
-/// as its usage shows them.
+/// Returns the arguments of a command: options with dashes, under all their names, and positional arguments as in the
+/// usage.
 fn options(command: &Command) -> Vec<String> {
     let names = command.get_arguments().flat_map(|argument| {
         let aliases = argument.get_all_aliases().unwrap_or_default();
@@ -131,7 +131,7 @@ fn options(command: &Command) -> Vec<String> {
     names.collect()
 }
 
-/// A setting in words of a command with these options.
+/// Names a setting for a command with these options.
 fn told(setting: Setting, options: &[String]) -> String {
     match named(setting) {
         (command, "") => format!("`{command}`"),
@@ -140,7 +140,7 @@ fn told(setting: Setting, options: &[String]) -> String {
     }
 }
 
-/// Whether a command of these options has this one, or both that it takes.
+/// Whether a command with these options has this one, or both parts of a pair.
 fn is_among(option: &str, options: &[String]) -> bool {
     let mut own = option.split(' ').filter(|word| word.starts_with(['-', '<']));
     own.all(|option| options.iter().any(|of_command| of_command == option))
@@ -153,7 +153,7 @@ mod tests {
     use super::*;
     use crate::{deltag::Deltag, deltille::Deltille};
 
-    /// The options of a command such as `deltille board`.
+    /// Returns the options of a command such as `deltille board`.
     fn options_of(command: &str) -> Vec<String> {
         let programs = [Deltille::command(), Deltag::command()];
         let (program, name) = command.split_once(' ').unwrap();
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn every_command_has_the_option_that_it_is_said_to_have() {
+    fn every_setting_names_an_existing_option() {
         for &setting in Setting::ALL {
             let (command, option) = named(setting);
             assert!(is_among(option, &options_of(command)), "{command} {option}");
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_are_options_of_the_command_that_runs_or_of_another() {
+    fn settings_are_named_by_options_of_the_running_command_first() {
         let told = |setting, command| told(setting, &options_of(command));
         assert_eq!(told(Setting::BoardRows, "deltille board"), "--rows");
         assert_eq!(told(Setting::CalibrationRefinePanels, "deltille rig"), "--refine-target");

@@ -1,14 +1,14 @@
 //! `deltag`: search, check, list and draw DelTag code families.
 //!
-//! Comes in: arguments. Goes out: files of families, pictures, messages and an exit code. A user meets the commands in
-//! this order:
+//! Input: arguments. Output: family files, drawings, messages and an exit code. The modules, in the order in which a
+//! user meets their commands:
 //!
-//! 1. `about` lists the families there are, tells of them, and checks what their files claim.
-//! 2. `search` makes others.
-//! 3. `draw` shows and prints their tags.
-//! 4. `exchange` writes them for other programs, and reads theirs.
+//! 1. `about` lists and describes families, and verifies their files.
+//! 2. `search` finds new ones.
+//! 3. `draw` draws and prints their tags.
+//! 4. `exchange` exports and imports them for other programs.
 //!
-//! `named` is the family that a command is given.
+//! `named` resolves the family that a command is given.
 
 mod about;
 mod draw;
@@ -36,37 +36,37 @@ pub struct Deltag {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Search a family such as d25h7 and write its file
+    /// Search for a family such as d25h7 and write its file
     #[command(after_help = gen_family::HELP, mut_arg("force", |arg| arg.help(gen_family::FORCE)))]
     GenFamily(gen_family::Args),
-    /// Check what a family file claims from nothing but its codes
+    /// Verify the claims of family files from their codes
     #[command(after_help = verify_family::HELP)]
     VerifyFamily(verify_family::Args),
-    /// Tell all about a family, or how far two are from each other
+    /// Describe a family, or compute the distance between two
     Info(info::Args),
-    /// Print what rules for complexity leave of a construction: codes, and natural false positives
+    /// List complexity rules with the codes they leave and their natural false-positive rates
     #[command(after_help = frontier::HELP)]
     Frontier(frontier::Args),
-    /// Print upper bounds for the size of a family, and how close the shipped ones come
+    /// Print upper bounds on the size of a family, and compare the shipped families with them
     Bounds(bounds::Args),
-    /// Name the smallest shipped family that suffices for a target
+    /// Find the smallest shipped family for a target
     Plan(plan::Args),
-    /// Print tags of a linear family by number, also those that its file does not list
+    /// Print tags of a linear family by rank, including those not listed in its file
     ByRank(by_rank::Args),
-    /// Write a family for another program
+    /// Export a family for another program
     Export(export::Args),
-    /// Make a family file of a table of another program
+    /// Create a family file from a table of another program
     #[command(after_help = import::HELP)]
     Import(import::Args),
-    /// Draw tags of a family on one picture, to look at
+    /// Draw tags of a family in one image
     Show(show::Args),
-    /// Print tags of a family to true scale, on as many pages as they take
+    /// Print tags of a family to scale, on as many pages as needed
     Sheet(sheet::Args),
-    /// List the families that come with the program
+    /// List the families that ship with the program
     List(list::Args),
-    /// Print what a shell reads to complete commands and options
+    /// Generate shell completions
     Completions(shell::Completions),
-    /// Write pages of the manual
+    /// Write manual pages
     Man(shell::Man),
 }
 

@@ -8,24 +8,26 @@ use crate::output::tell;
 use deltille::family::{self, Family, PAIRS_COUNTED, certify_codes, shipped_names};
 use deltille::lattice::GridKind;
 
-/// Refuses families of other tags than DelTags.
+/// Rejects families whose tags are not DelTags.
 pub fn deltags(family: Family) -> anyhow::Result<Family> {
     if family.kind() != GridKind::Deltille {
         let name = family.name();
         bail!(
-            "{name}: its tags are square, deltag is about triangular ones; squares carry them: \
+            "{name} has square tags, but deltag works with triangular ones; for square tags, use \
              `deltille checkerboard --tags {name}`"
         );
     }
     if family.is_of_places() {
         let name = family.name();
-        bail!("{name}: its tags tell a place together only, on boards: `deltille board --dense`");
+        bail!(
+            "{name} contains position codes, which work only on whole boards: use `deltille board --dense`"
+        );
     }
     Ok(family)
 }
 
-/// A family to make something of. The codes of a file that comes from elsewhere are compared where
-/// that is a matter of a second, and a word is said where they are not what the file claims.
+/// Resolves a family to use. Compares the codes of a file that did not ship with the program if this takes less than
+/// a second, and warns if they contradict its claims.
 pub fn resolve(name_or_path: &str) -> anyhow::Result<Family> {
     let family = deltags(family::resolve(name_or_path)?)?;
     if !shipped_names().contains(&name_or_path)
@@ -33,7 +35,7 @@ pub fn resolve(name_or_path: &str) -> anyhow::Result<Family> {
         && let Some(failure) = certify_codes(&family).failures.first()
     {
         let file = Path::new(name_or_path).display();
-        tell!("warning: {file} is not what it claims: {failure}");
+        tell!("warning: {file} contradicts its own claims: {failure}");
     }
     Ok(family)
 }

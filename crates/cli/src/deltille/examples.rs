@@ -1,4 +1,4 @@
-//! Examples at the end of every command's help. The program understands each, see `tests/it/files/help.rs`.
+//! Examples at the end of every command's help. `tests/it/files/help.rs` checks that each parses.
 
 pub const PLAN: &str = "Examples:
   deltille plan --size 1920x1080 --fov 62 --distance 50cm..3m

@@ -1,14 +1,15 @@
-//! `deltille`: make, detect and verify deltille targets.
+//! `deltille`: make, detect, calibrate with and verify deltille targets.
 //!
-//! Comes in: arguments. Goes out: files, messages and an exit code. A user meets the commands in this order:
+//! Input: arguments. Output: files, messages and an exit code. The modules, in the order in which a user meets their
+//! commands:
 //!
-//! 1. `make` plans a target, makes it, and compares its files with its description.
-//! 2. `see` finds targets in photographs.
-//! 3. `calibrate` makes cameras and rigs of what was found, says which photograph to take next, and compares results.
-//! 4. `apply` uses these cameras: poses of targets, pictures without distortion.
-//! 5. `measure` is about the library itself.
+//! 1. `make` plans and makes targets, and verifies their files.
+//! 2. `see` detects targets in photographs.
+//! 3. `calibrate` calibrates cameras and rigs from detections, proposes the next photograph, and compares results.
+//! 4. `apply` uses the calibrated cameras: target poses, undistorted images.
+//! 5. `measure` evaluates the library itself.
 //!
-//! `files` is what all of them read and write, `examples` the end of each command's help.
+//! `files` contains the input and output shared by all of them, and `examples` the end of each command's help.
 
 mod apply;
 mod calibrate;
@@ -43,32 +44,32 @@ pub struct Deltille {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Propose a board for a camera and the distances from which it is to be seen
+    /// Propose a board for a camera and a range of distances
     #[command(after_help = examples::PLAN)]
     Plan(plan::Args),
-    /// Make a board: its description, and what to print
+    /// Make a board: its description, and files to print
     #[command(after_help = examples::BOARD, mut_arg("tags_in", |arg| arg.hide(true)))]
     Board(Box<board::Args>),
     /// Make a checkerboard, plain or with square tags
     #[command(after_help = examples::CHECKERBOARD)]
     #[command(mut_arg("family", |arg| arg.long("tags").alias("family")))]
     Checkerboard(Box<board::Args>),
-    /// Make a ChArUco board, a checkerboard with markers, for OpenCV
+    /// Make a ChArUco board (a checkerboard with markers) for OpenCV
     #[command(after_help = examples::CHARUCO)]
     Charuco(Box<charuco::Args>),
-    /// Make an AprilGrid, tags in rows, for Kalibr
+    /// Make an AprilGrid (rows of tags) for Kalibr
     #[command(after_help = examples::APRILGRID)]
     Aprilgrid(Box<aprilgrid::Args>),
     /// Make a grid of circles, plain or asymmetric, for OpenCV
     #[command(after_help = examples::CIRCLES)]
     Circles(Box<circles::Args>),
-    /// Make a tetrahedron with tagged boards on its faces: a mesh, and what to print
+    /// Make a tetrahedron with tagged boards on its faces: a mesh, and files to print
     #[command(after_help = examples::SOLID)]
     Tetrahedron(Box<solid::Args>),
-    /// Make an octahedron
+    /// Make an octahedron with tagged boards on its faces
     #[command(after_help = examples::SOLID)]
     Octahedron(Box<solid::Args>),
-    /// Make an icosahedron
+    /// Make an icosahedron with tagged boards on its faces
     #[command(after_help = examples::SOLID)]
     Icosahedron(Box<solid::Args>),
     /// Make a cube with tagged checkerboards on its faces
@@ -78,7 +79,7 @@ enum Command {
     #[command(mut_arg("tag_spacing", |arg| arg.help(solid::squares::SPACING)))]
     #[command(mut_arg("tag_border", |arg| arg.help(solid::squares::BORDER)))]
     Cube(Box<solid::Args>),
-    /// Make a cuboid: a box whose sides differ
+    /// Make a cuboid with tagged checkerboards on its faces
     #[command(after_help = examples::CUBOID)]
     #[command(mut_arg("edge", |arg| arg.help(solid::squares::MEAN)))]
     #[command(mut_arg("tiles", |arg| arg.help(solid::squares::TILES)))]
@@ -86,54 +87,54 @@ enum Command {
     #[command(mut_arg("tag_spacing", |arg| arg.help(solid::squares::SPACING)))]
     #[command(mut_arg("tag_border", |arg| arg.help(solid::squares::BORDER)))]
     Cuboid(Box<solid::CuboidArgs>),
-    /// Make a solid of any closed mesh: of triangles, rectangles and other convex faces
+    /// Make a solid from any closed mesh of triangles, rectangles and other convex faces
     #[command(after_help = examples::MESH)]
     #[command(mut_arg("edge", |arg| arg.help(solid::MEAN_OF_MESH)))]
     Solid(Box<solid::MeshArgs>),
-    /// Compare the files of a target with its description
+    /// Verify the files of a target against its description
     #[command(after_help = examples::VERIFY)]
     Verify(verify::Args),
-    /// Take a synthetic photograph of a target, with the true positions of its corners
+    /// Render a synthetic photograph of a target, with the true positions of its corners
     #[command(after_help = examples::RENDER)]
     Render(render::Args),
-    /// Find a target, or untagged boards, in photographs
+    /// Detect a target, or untagged boards, in photographs
     #[command(after_help = examples::DETECT)]
     Detect(detect::Args),
-    /// Refine given positions of corners
+    /// Refine given corner positions
     #[command(after_help = examples::REFINE)]
     Refine(refine::Args),
-    /// Say which photograph of a target to take next, until the camera is known well enough
+    /// Propose the next photograph of a target to take, until the camera is known well enough
     #[command(after_help = examples::GUIDE)]
     Guide(Box<guide::Args>),
-    /// Find a camera from detections
+    /// Calibrate a camera from detected corners
     #[command(after_help = examples::CALIBRATE)]
     Calibrate(one_camera::Args),
-    /// Find the cameras of a rig, and where they are to each other, from detections
+    /// Calibrate the intrinsics and extrinsics of a multi-camera rig
     #[command(after_help = examples::RIG)]
     Rig(rig::Args),
-    /// Say whether two calibrations of a camera or rig differ by more than chance
+    /// Test whether two calibrations of a camera or rig differ significantly
     ///
-    /// The exit code is 0 where they do not, 1 where they do, and 3 where it cannot be judged, as the uncertainties of a
-    /// camera are not known: give the .json of a calibration.
+    /// The exit code is 0 if they do not differ, 1 if they do, and 3 if this cannot be determined because the
+    /// uncertainties of a camera are unknown. Use the .json of a calibration, which contains them.
     #[command(after_help = examples::COMPARE)]
     Compare(compare::Args),
-    /// Say where a target is in photographs of a known camera
+    /// Estimate the pose of a target in photographs from a calibrated camera
     #[command(after_help = examples::POSE)]
     Pose(pose::Args),
-    /// Take the distortion of a camera out of photographs: pictures as of a pinhole, or maps
+    /// Undistort images to a pinhole projection, or write the remap tables
     #[command(after_help = examples::UNDISTORT)]
     Undistort(undistort::Args),
-    /// Rectify two cameras of a rig, so that a point is in the same row of both pictures
+    /// Rectify two cameras of a rig, so that a point is in the same row of both images
     #[command(after_help = examples::RECTIFY)]
     Rectify(undistort::PairArgs),
-    /// Time the stages of detection on this machine
+    /// Measure the run time of the detection stages on this machine
     Bench(bench::Args),
-    /// Measure the library on simulated images
+    /// Evaluate the library on simulated images
     Experiment(experiment::Args),
-    /// Print what a shell reads to complete commands and options
+    /// Generate shell completions
     #[command(after_help = shell::COMPLETIONS)]
     Completions(shell::Completions),
-    /// Write pages of the manual
+    /// Write manual pages
     #[command(after_help = shell::MAN)]
     Man(shell::Man),
 }

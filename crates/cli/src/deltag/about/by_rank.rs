@@ -12,10 +12,10 @@ use deltille::family::{self, Construction, Screen, TagWords};
 pub struct Args {
     /// A shipped family such as d49h12, or a family file
     family: String,
-    /// First number, from 0
+    /// Rank of the first tag, counted from 0
     #[arg(long, allow_negative_numbers = true, value_parser = whole(0..=u64::MAX))]
     rank: u64,
-    /// How many
+    /// Number of tags to print
     #[arg(long, default_value_t = 1, allow_negative_numbers = true,
           value_parser = whole(1..=u64::MAX))]
     count: u64,
@@ -24,28 +24,34 @@ pub struct Args {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let family = deltags(family::resolve(&args.family)?)?;
     let Construction::Algebraic(construction) = family.construction() else {
-        anyhow::bail!("{}: not an algebraic family, its codes have no rank", args.family);
+        anyhow::bail!("{}: only codes of an algebraic family have ranks", args.family);
     };
     let words = TagWords::new(family.dimension());
     let screen = Screen::new(words.clone(), family.distance(), family.rules());
     for rank in args.rank..=args.rank.saturating_add(args.count - 1) {
         let (word, count) = construction.by_rank(family.dimension(), rank).with_context(|| {
-            format!("{}: more than a linear code, its codes have no rank", args.family)
+            format!(
+                "{}: the family is not a plain linear code, so its codes have no ranks",
+                args.family
+            )
         })?;
         let word = word.with_context(|| {
-            format!("--rank {rank}: there are {count}, numbered from 0 to {}", count - 1)
+            format!(
+                "--rank {rank}: the family has {count} codes, with ranks from 0 to {}",
+                count - 1
+            )
         })?;
-        // Found out at the first one, before anything is printed.
+        // Checked before the first line is printed.
         let left = count - args.rank;
         anyhow::ensure!(
             args.count <= left,
-            "--count {}: from --rank {} on there are {left}",
+            "--count {}: only {left} codes remain from --rank {}",
             args.count,
             args.rank
         );
         let mut line = format!("{rank} {}", words.hex(word));
         if !screen.admits(word) {
-            line.push_str(" breaks a rule of the family");
+            line.push_str(" violates a rule of the family");
         }
         // Writing to a String cannot fail.
         let _ = writeln!(line);

@@ -6,20 +6,20 @@ use serde_json::json;
 use crate::output::{self, Telling, say};
 use deltille::family::{Confusion, Family, PAIRS_COUNTED};
 
-/// Tells how far the tags of two families are from each other.
+/// Reports the minimum distance between the tags of two families.
 pub fn about(of: &Family, other: &Family, telling: Telling) -> anyhow::Result<()> {
     let Some(confusion) = Confusion::between(of, other) else {
         let bits = [of, other].map(|family| family.dimension().bits());
         if bits[0] != bits[1] {
             bail!(
-                "{} and {}: their tags have {} and {} cells, so that none is read as one of the other",
+                "{} and {}: their tags have {} and {} cells, so they cannot be confused",
                 of.name(),
                 other.name(),
                 bits[0],
                 bits[1]
             );
         }
-        bail!("more than {PAIRS_COUNTED} codes are not compared one by one");
+        bail!("families of more than {PAIRS_COUNTED} codes are not compared code by code");
     };
     let Confusion { direct, mirrored, .. } = &confusion;
     let within = |most: u32| [direct, mirrored].map(|all| all.range(..=most).map(|(_, n)| n).sum());
@@ -35,26 +35,26 @@ pub fn about(of: &Family, other: &Family, telling: Telling) -> anyhow::Result<()
         }));
     }
     say!(
-        "{} of {} codes, {} of {}, turned in all ways",
+        "{} of {} codes, {} of {}, in all rotations",
         of.name(),
         of.len(),
         other.name(),
         other.len()
     );
-    say!("  pairs of a tag of each            as printed   in a mirror");
+    say!("  pairs of one tag of each          as printed      mirrored");
     let least =
         |all: &std::collections::BTreeMap<u32, u64>| all.keys().next().copied().unwrap_or(0);
-    say!("  differ in so many cells at least  {:>10}  {:>12}", least(direct), least(mirrored));
+    say!("  minimum distance in cells         {:>10}  {:>12}", least(direct), least(mirrored));
     for most in 0..=t.max(u) {
         let [direct, mirrored]: [u64; 2] = within(most);
         let corrected = match most {
-            0 => "are the same".to_owned(),
-            n => format!("differ in {n} at most"),
+            0 => "are identical".to_owned(),
+            n => format!("differ in at most {n} cells"),
         };
         say!("  {corrected:<32}  {direct:>10}  {mirrored:>12}");
     }
     say!(
-        "  {} corrects {t}, {} {u}: pairs that differ in no more cells are taken for each other",
+        "  {} corrects {t} cells, {} {u}: pairs at most this far apart can be confused",
         of.name(),
         other.name()
     );

@@ -1,4 +1,4 @@
-//! What `deltag` says of false positives: by fair coins, and in natural pictures.
+//! False-positive rates that `deltag` reports: on random bits, and in natural images.
 
 use serde_json::{Value, json};
 
@@ -8,7 +8,7 @@ use deltille::family::{
 };
 use deltille_core::words::counted;
 
-/// Adds the fields of `--json` to what is told of a family.
+/// Adds the rates to the JSON description of a family.
 pub fn add_to(told: &mut Value, family: &Family) {
     let natural = family.natural_false_positive_rates();
     let per_megapixel = natural
@@ -22,26 +22,26 @@ pub fn add_to(told: &mut Value, family: &Family) {
     told["recommended_correction"] = json!(recommended_correction(natural.as_deref()));
 }
 
-/// Says both rates for each number of corrected cells.
+/// Prints both rates for each number of corrected cells.
 pub fn tell(family: &Family) -> anyhow::Result<()> {
     let natural = family.natural_false_positive_rates();
-    say!("  a triangle with a border that is no tag is taken for one with probability");
-    say!("    fair coins  natural pictures  when");
+    say!("  probability that a triangle with a border that is not a tag is accepted as one");
+    say!("    random bits   natural images  when correcting");
     for (corrected, rate) in family.false_positive_rates().iter().enumerate() {
         let natural =
             natural.as_ref().map_or("-".to_owned(), |all| format!("{:.1e}", all[corrected]));
         let corrected = match corrected {
-            0 => "nothing is".to_owned(),
-            1 => "1 cell is".to_owned(),
-            n => format!("up to {n} cells are"),
+            0 => "no cells".to_owned(),
+            1 => "1 cell".to_owned(),
+            n => format!("up to {n} cells"),
         };
-        say!("    {rate:>10.1e}  {natural:>16}  {corrected} corrected");
+        say!("    {rate:>11.1e}  {natural:>15}  {corrected}");
     }
     if natural.is_some() {
-        say!("  rates in natural pictures are known within a factor of {NATURAL_FACTOR}");
+        say!("  rates in natural images are accurate to within a factor of {NATURAL_FACTOR}");
     }
     say!(
-        "  of a natural picture `detect` reads {TRIANGLES_PER_MEGAPIXEL} triangles in a megapixel, or fewer"
+        "  in natural images, `detect` reads at most {TRIANGLES_PER_MEGAPIXEL} triangles per megapixel"
     );
     say!("  recommended     {}", recommended(natural.as_deref()));
     Ok(())
@@ -51,17 +51,17 @@ fn recommended_correction(natural: Option<&[f64]>) -> Option<u32> {
     corrected_within(natural?, ACCEPTED_FALSE_POSITIVES)
 }
 
-/// How many cells of a single tag may be corrected, by a family's natural rates.
+/// Returns the recommended number of corrected cells for single tags, from the natural rates of a family.
 pub fn recommended(natural: Option<&[f64]>) -> String {
     let rate = format!("{ACCEPTED_FALSE_POSITIVES:.0e}");
     match recommended_correction(natural) {
-        Some(0) => format!(
-            "whoever believes single tags corrects nothing: natural false positives below {rate}"
-        ),
+        Some(0) => {
+            format!("correct no cells in single tags: natural false-positive rate below {rate}")
+        }
         Some(most) => format!(
-            "whoever believes single tags corrects {} at most: natural false positives below {rate}",
+            "correct at most {} in single tags: natural false-positive rate below {rate}",
             counted(most as usize, "cell")
         ),
-        None => format!("believe no single tag: natural false positives are above {rate}"),
+        None => format!("do not accept single tags: natural false-positive rate above {rate}"),
     }
 }

@@ -12,31 +12,31 @@ use deltille_core::words::counted;
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// A shipped family, or a family file; of two it is told how far they are from each other
+    /// A shipped family or a family file; given two, prints the distance between them
     #[arg(required = true, num_args = 1..=2, value_names = ["FAMILY", "OTHER"])]
     families: Vec<String>,
     #[command(flatten)]
     telling: Telling,
 }
 
-/// Rows and columns of the board that coverage is told in, that of the paper.
+/// Rows and columns of the board used to express the size of a family; the board of the paper.
 const BOARD: [u32; 2] = [10, 11];
 
-/// How many tags a target takes with the settings that `deltille` has by default.
+/// Counts the tags of a target with the default settings of `deltille`.
 fn tags_of(spec: &TargetSpec) -> anyhow::Result<usize> {
     let family = Family::shipped(&TagSpec::default().family)?;
     let target = Target::build("probe", spec, Some(&family))?;
     Ok(target.panels.iter().map(|panel| panel.tags.len()).sum())
 }
 
-/// The distances that are left with cells hidden, of a family whose pairs are counted.
+/// Returns the minimum distances with cells hidden, for families small enough to count all pairs.
 fn without_hidden(family: &Family) -> Vec<(HiddenCells, u32)> {
     let known = family.len() <= PAIRS_COUNTED;
     let all = HiddenCells::ALL.into_iter().filter(|_| known);
     all.filter_map(|hidden| Some((hidden, family.distance_without(hidden)?))).collect()
 }
 
-/// How many codes no such family exceeds, and how that is known.
+/// Returns an upper bound on the number of codes, and how it was obtained.
 fn upper_bound(family: &Family) -> (u64, &'static str) {
     let bounds = family.bounds();
     match bounds.found_none() {
@@ -83,26 +83,26 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     say!("  distance        {}, corrects {} cells", family.distance(), family.correctable());
     if let Some(free) = rules.free {
         let cells = counted(family.free_cells().count_ones() as usize, "cell");
-        say!("  free            {cells}, the {}: no code uses them", free.name());
+        say!("  free            {cells}, the {}: not used by any code", free.name());
     }
     for (hidden, left) in without_hidden(&family) {
         let cells = hidden.count(family.dimension());
         let what = match hidden {
-            HiddenCells::Apex => format!("the {cells} of a corner"),
-            HiddenCells::Edge => format!("the {cells} along an edge"),
-            _ => format!("any {cells} in a triangle"),
+            HiddenCells::Apex => format!("the {cells} cells of a corner"),
+            HiddenCells::Edge => format!("the {cells} cells along an edge"),
+            _ => format!("any {cells} cells in a triangle"),
         };
         let kept = rules.robust.iter().find(|rule| rule.to == hidden);
-        let kept = kept.map_or(String::new(), |rule| format!(", by rule {}", rule.distance));
+        let kept = kept.map_or(String::new(), |rule| format!(", required {}", rule.distance));
         say!("                  {left} with {what} hidden ({}{kept})", hidden.name());
     }
     for before in family.beginnings() {
         let (codes, fingerprint) = (before.codes, &before.fingerprint);
-        say!("  began as        {codes} codes, fingerprint {fingerprint}");
+        say!("  extends         {codes} codes, fingerprint {fingerprint}");
     }
     say!(
-        "  rules           every code: {} of {} neighbouring pairs of cells differ, {} cells are white, \
-         {} black, at least",
+        "  rules           every code: at least {} of {} adjacent cell pairs differ, {} cells white, \
+         {} black",
         (rules.min_complexity * f64::from(pairs) - 1e-9).ceil(),
         pairs,
         rules.black_distance,
@@ -136,10 +136,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     );
     false_positives::tell(&family)?;
     if family.histogram().is_empty() {
-        say!("  distances       of so many codes are not counted");
+        say!("  distances       not counted for this many codes");
         return Ok(ExitCode::SUCCESS);
     }
-    say!("  pairs of words, turns included, at each distance");
+    say!("  number of word pairs, all rotations included, by distance");
     let most = family.histogram().values().copied().max().unwrap_or(1) as f64;
     for (distance, pairs) in family.histogram() {
         let bar = "█".repeat((40.0 * *pairs as f64 / most).ceil() as usize);

@@ -1,12 +1,12 @@
-//! What is known of families.
+//! Information about families.
 //!
-//! Comes in: families, by name or as files. Goes out: what they are, in words or as JSON, and whether that is true.
+//! Input: families, by name or as files. Output: their properties as text or JSON, and whether their claims are true.
 //!
-//! 1. `list` has the families that come with the program.
-//! 2. `info` tells all about one; `confusion` how far two are from each other, `false_positives` how often a tag is seen
-//!    where there is none, `place_codes` what holds for codes of places only.
-//! 3. `verify_family` compares what a file claims with its codes.
-//! 4. `by_rank` prints tags of a linear family that its file does not list.
+//! 1. `list` lists the families that ship with the program.
+//! 2. `info` describes one family. `confusion` computes the distance between two, `false_positives` the
+//!    false-positive rates, and `place_codes` covers position codes.
+//! 3. `verify_family` checks the claims of a file against its codes.
+//! 4. `by_rank` prints tags of a linear family beyond those listed in its file.
 
 pub mod by_rank;
 mod confusion;

@@ -1,4 +1,4 @@
-//! What `deltag` tells of place codes, which are no family like others.
+//! Output of `deltag` for position codes, which are not a family of individual tags.
 
 use serde_json::json;
 
@@ -7,7 +7,7 @@ use deltille::family::Family;
 use deltille::family::places::{BITS, BOARDS, PLACES, PatchCertificate, certify_places};
 use deltille_core::words::counted;
 
-/// Tells all about them.
+/// Prints a description of the position codes.
 pub fn about(family: &Family, telling: Telling) -> anyhow::Result<()> {
     if telling.is_json() {
         let patches = certify_places().into_iter().map(|certificate| {
@@ -23,14 +23,12 @@ pub fn about(family: &Family, telling: Telling) -> anyhow::Result<()> {
         }));
     }
     say!("{}, fingerprint {}", family.name(), family.fingerprint());
-    say!(
-        "  of a kind of its own: every upright tile of a board tells, with some beside it, where it is"
-    );
+    say!("  position codes: any few adjacent upright tiles identify their position on the board");
     say!("  cells           {BITS} in a tile");
-    say!("  boards          {BOARDS}, by their ids from 0");
-    say!("  places          {PLACES} on each, which come again after 256 edges");
-    say!("  patches differ, wherever two of them are and however they are turned, at least in");
-    say!("    tiles  forms  cells  told apart by counting, with errors corrected");
+    say!("  boards          {BOARDS}, with ids from 0");
+    say!("  positions       {PLACES} on each board, repeating after 256 edges");
+    say!("  minimum distance between any two patches, in any position and rotation");
+    say!("    tiles  forms  cells  corrected errors, and distance to mirrored patches");
     for certificate in certify_places() {
         say!("{}", line(&certificate));
     }
@@ -41,15 +39,15 @@ pub fn about(family: &Family, telling: Telling) -> anyhow::Result<()> {
 fn line(certificate: &PatchCertificate) -> String {
     let least = certificate.least.places.min(certificate.least.turned);
     let mirrored = match certificate.least.mirrored {
-        0 => "from mirrored ones by more tiles only".to_owned(),
-        cells => format!("from mirrored ones in {cells}"),
+        0 => "mirrored ones need more tiles".to_owned(),
+        cells => format!("mirrored ones differ in {cells}"),
     };
     let PatchCertificate { tiles, forms, .. } = certificate;
     let corrected = least.saturating_sub(1) / 2;
     format!("    {tiles:>5}  {forms:>5}  {least:>5}  {corrected} corrected, {mirrored}")
 }
 
-/// Whether what is claimed of them holds, and what was found.
+/// Checks the claimed distances; returns whether they are met, and a description.
 pub fn verify(family: &Family) -> (bool, String) {
     let certificates = certify_places();
     let cells = |c: &PatchCertificate| c.least.places.min(c.least.turned);
@@ -58,17 +56,19 @@ pub fn verify(family: &Family) -> (bool, String) {
         let found = cells(broken);
         return (
             false,
-            format!("two patches of {tiles} tiles differ in {found} cells, not {claimed}"),
+            format!(
+                "two patches of {tiles} tiles differ in {found} cells, but {claimed} are claimed"
+            ),
         );
     }
     let distances = certificates
         .iter()
-        .map(|c| format!("{} tiles in {}", c.tiles, counted(cells(c) as usize, "cell")));
+        .map(|c| format!("{} tiles: {}", c.tiles, counted(cells(c) as usize, "cell")));
     let distances = distances.collect::<Vec<_>>().join(", ");
     let mirrored = certificates.last().map_or(0, |certificate| certificate.least.mirrored);
     let what = format!(
-        "{PLACES} places on each of {BOARDS} boards; any two patches, turned or not, differ: {distances} at least, \
-         the last from mirrored ones in {mirrored}; fingerprint {}",
+        "{PLACES} positions on each of {BOARDS} boards; minimum distance between patches in any rotation: {distances}, \
+         the last {mirrored} from mirrored ones; fingerprint {}",
         family.fingerprint()
     );
     (true, what)

@@ -8,12 +8,11 @@ use crate::run::{BAD_INPUT, FAILED, report};
 use deltille::family::{self, Certificate, Family, FamilyFileError, Robust, certify};
 use deltille_core::words::counted;
 
-/// Told at the end of `--help`.
-pub const HELP: &str = "Checked are the codes (distance, rules, fingerprint, statistics) and the \
-    construction: an algebraic one, and a lexicode of up to 25 bits, is written down again; what is \
-    not repeated is named. Seeds and texts are taken as they are. Exit code 0 when all that is \
-    checked holds for every family, 1 when something does not, 2 when a file cannot be read as a \
-    family file.";
+/// Text at the end of `--help`.
+pub const HELP: &str = "Checks the codes (distance, rules, fingerprint, statistics) and the construction. Algebraic \
+    constructions, and lexicodes of up to 25 bits, are recomputed; the output names every claim that is not checked. \
+    Seeds and texts are not checked. Exit code 0 if all checks pass for every family, 1 if one fails, 2 if a file \
+    cannot be read as a family file.";
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -47,9 +46,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                 "mirror_distance": certificate.and_then(|found| found.mirror_distance),
             }));
         } else if holds {
-            say!("{name}: holds. {what}");
+            say!("{name}: verified. {what}");
         } else {
-            say!("{name}: DOES NOT HOLD. {what}");
+            say!("{name}: FAILED. {what}");
         }
     }
     if args.telling.is_json() {
@@ -62,7 +61,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     })
 }
 
-/// Whether what a family claims holds, and what was found.
+/// Checks the claims of a family; returns whether they are true, and a description.
 fn verify(family: &Family, certificate: &Certificate) -> (bool, String) {
     if !certificate.holds() {
         return (false, certificate.failures.join("; "));
@@ -78,38 +77,38 @@ fn verify(family: &Family, certificate: &Certificate) -> (bool, String) {
         family.len()
     );
     let before = family.beginnings().iter().map(|before| {
-        format!("; the first {} are those of fingerprint {}", before.codes, before.fingerprint)
+        format!("; the first {} codes have fingerprint {}", before.codes, before.fingerprint)
     });
     let what: String = std::iter::once(what).chain(before).collect();
     (true, what)
 }
 
-/// How far apart the codes of a family that claims a distance are, and how that is known.
+/// Describes the minimum distance of a family, and how it was established.
 pub fn proof_of(certificate: &Certificate, claimed: u32) -> String {
     let found = certificate.min_distance;
     let cells = counted(found as usize, "cell");
     if !certificate.all_compared {
         return format!(
-            "all are in a linear code of distance {claimed} that turning leaves as it is, checked word \
-             by word; a sample of pairs, too, differs in at least {cells}"
+            "all codes are in a linear code of distance {claimed} that is closed under rotation, checked word by \
+             word; in a sample of pairs, any two also differ in at least {cells}"
         );
     }
-    let known = format!("any two, in any turn, differ in at least {cells}");
+    let known = format!("any two codes, in any rotation, differ in at least {cells}");
     let known = match found > claimed {
-        true => format!("{known}, more than the {claimed} asked for"),
+        true => format!("{known}, more than the required {claimed}"),
         false => known,
     };
     let hidden =
-        |found: &Robust| format!("; with any {} hidden in {}", found.to.name(), found.distance);
+        |found: &Robust| format!("; with any {} hidden, in {}", found.to.name(), found.distance);
     let known: String =
         std::iter::once(known).chain(certificate.robust.iter().map(hidden)).collect();
     match certificate.mirror_distance {
-        Some(cells) => format!("{known}; from one seen in a mirror in {cells}"),
+        Some(cells) => format!("{known}; mirrored codes differ in {cells}"),
         None => known,
     }
 }
 
-/// What is wrong in a file that is named already.
+/// Returns the error without the file name, which the caller has already printed.
 fn reason(error: &FamilyFileError) -> &dyn std::fmt::Display {
     match error {
         FamilyFileError::In { error, .. } => error,

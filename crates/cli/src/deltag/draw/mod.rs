@@ -1,7 +1,7 @@
-//! Tags to look at, and to print.
+//! Drawings and prints of tags.
 //!
-//! 1. `show` draws tags of a family on one picture.
-//! 2. `sheet` puts them on pages to true scale, which are compared with what they should show.
+//! 1. `show` draws tags of a family in one image.
+//! 2. `sheet` prints them to scale and verifies the pages.
 
 pub mod sheet;
 pub mod show;

@@ -16,33 +16,33 @@ use deltille::limits::Limits;
 use deltille::targets::{TagSheetSpec, TargetSpec, parse_length_mm};
 use deltille::verify::{Verifier, VerifyError};
 
-/// More pages at once are a mistake.
+/// Largest number of pages; more are probably a mistake.
 const MOST_PAGES: usize = 200;
 
 #[derive(clap::Args)]
 pub struct Args {
     /// A name from `deltag list`, or a family file
     family: String,
-    /// Which tags: ids and ranges such as 0-99 or 3,7,20-25 [default: all]
+    /// Tags to print: ids and ranges such as 0-99 or 3,7,20-25 [default: all]
     #[arg(long, allow_hyphen_values = true)]
     ids: Option<Ids>,
-    /// Edge of a tag, such as 30mm or 1.5in
+    /// Edge length of a tag, such as 30mm or 1.5in
     #[arg(long, value_name = "LENGTH", default_value = "30mm", allow_hyphen_values = true)]
     edge: String,
-    /// Black border of a tag in bit-widths, as on boards
+    /// Width of a tag's black border in cells, as on boards
     #[arg(long, value_name = "BITS", default_value_t = 1.5, allow_negative_numbers = true,
           value_parser = crate::values::number(0.6..=10.0))]
     tag_border: f64,
-    /// Paper
+    /// Paper size
     #[arg(long, help = format!("Paper: {}", PaperSize::choice()), default_value = "A4", allow_hyphen_values = true)]
     paper: String,
-    /// Which way the paper lies: auto (the one that takes more tags), portrait, landscape
+    /// Page orientation: auto (fits the most tags), portrait or landscape
     #[arg(long, default_value = "auto")]
     orientation: String,
-    /// Width of the strip along the edges of the paper that stays blank [default: 5mm]
+    /// Blank margin along the edges of the paper [default: 5mm]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     margin: Option<String>,
-    /// Write a PDF of all pages; so it is where neither --svg nor --png is asked for
+    /// Write a PDF of all pages (default unless --svg or --png is given)
     #[arg(long)]
     pdf: bool,
     /// Write an SVG of each page
@@ -54,20 +54,20 @@ pub struct Args {
     /// Resolution of the PNG, dots per inch [default: 300]
     #[arg(long, allow_negative_numbers = true, value_parser = whole(150..=2400u32))]
     dpi: Option<u32>,
-    /// Folder for the files
+    /// Output folder
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
-    /// Stem of the files' names [default: the family's name and -sheet]
+    /// Stem of the file names [default: the family's name followed by -sheet]
     #[arg(long, value_parser = name, allow_hyphen_values = true)]
     name: Option<String>,
     #[command(flatten)]
     overwrite: Overwrite,
-    /// Do not read the written files back to compare every cell
+    /// Do not read the files back to verify every cell
     #[arg(long)]
     no_verify: bool,
 }
 
-/// Lays out the tags, writes the pages, and verifies what it wrote.
+/// Lays out the tags, writes the pages, and verifies them.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let family = resolve(&args.family)?;
     let length =
@@ -81,10 +81,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         },
         ..PaperSpec::default()
     };
-    ensure!(args.dpi.is_none() || args.png, "--dpi: there is no PNG to write: add --png");
+    ensure!(args.dpi.is_none() || args.png, "--dpi needs --png");
     ensure!(
         args.output.is_dir() || args.output.extension().is_none(),
-        "-o {}: name a folder; --name gives the stem of the files in it",
+        "-o {} must be a folder; set the file names with --name",
         args.output.display()
     );
     if let Some(ids) = &args.ids {
@@ -106,8 +106,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let pages = target.sheets.len();
     ensure!(
         pages <= MOST_PAGES,
-        "--ids: {count} tags take {pages} pages, more than {MOST_PAGES}: take fewer, such as --ids \
-         0-99, a smaller --edge or larger --paper"
+        "--ids: {count} tags need {pages} pages, but at most {MOST_PAGES} are allowed: print fewer tags (such as \
+         --ids 0-99), or use a smaller --edge or larger --paper"
     );
 
     let formats =
@@ -128,7 +128,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let verdict = match verifier.verify_path(path) {
             Err(VerifyError::Cancelled) => {
                 return Err(Interrupted(
-                    "the files are whole, but were not all compared".to_owned(),
+                    "the files are complete, but not all were verified".to_owned(),
                 )
                 .into());
             }

@@ -11,17 +11,17 @@ use deltille::export::kind::Kind;
 use deltille::export::{png, svg};
 use deltille::layout::Finish;
 
-/// Most tags on one picture: a sheet of A0 size at the default edge.
+/// Largest number of tags in one image: about an A0 sheet at the default edge length.
 const MOST_TAGS: usize = 600;
 
 #[derive(clap::Args)]
 pub struct Args {
     /// A name from `deltag list`, or a family file
     family: String,
-    /// Which tags: ids and ranges such as 0-9 or 3,7,20-25 [default: the first ten]
+    /// Tags to draw: ids and ranges such as 0-9 or 3,7,20-25 [default: the first ten]
     #[arg(long, allow_hyphen_values = true)]
     ids: Option<Ids>,
-    /// Write an SVG; so it is where --png is not asked for
+    /// Write an SVG (default unless --png is given)
     #[arg(long)]
     svg: bool,
     /// Write a PNG
@@ -30,14 +30,14 @@ pub struct Args {
     /// Resolution of the PNG, dots per inch [default: 200]
     #[arg(long, allow_negative_numbers = true, value_parser = whole(20..=2400u32))]
     dpi: Option<u32>,
-    /// Tags in a row
+    /// Number of tags per row
     #[arg(long, default_value_t = 5, allow_negative_numbers = true,
           value_parser = whole(1..=100u16))]
     columns: u16,
-    /// Folder for the files, or the file where there is one
+    /// Output folder, or the output file if there is only one
     #[arg(short, long, default_value = ".")]
     output: PathBuf,
-    /// Stem of the files' names [default: the family's name]
+    /// Stem of the file names [default: the family's name]
     #[arg(long, value_parser = name, allow_hyphen_values = true)]
     name: Option<String>,
     #[command(flatten)]
@@ -51,9 +51,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Ids(ids) = ids;
     anyhow::ensure!(
         ids.len() <= MOST_TAGS,
-        "--ids: more than {MOST_TAGS} tags do not fit on one picture; `deltag sheet` takes more"
+        "--ids: at most {MOST_TAGS} tags fit in one image; use `deltag sheet` for more"
     );
-    anyhow::ensure!(args.dpi.is_none() || args.png, "--dpi: there is no PNG to write: add --png");
+    anyhow::ensure!(args.dpi.is_none() || args.png, "--dpi needs --png");
     let stem = args.name.as_deref().unwrap_or(family.name());
     let svg = args.svg || !args.png;
     let place = |extension| output::file(&args.output, stem, extension);

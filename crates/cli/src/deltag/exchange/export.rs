@@ -13,13 +13,13 @@ use deltille::family::{ExportFormat, export};
 pub struct Args {
     /// A shipped family, or a family file
     family: String,
-    /// What to write
+    /// Output format
     #[arg(long, value_enum)]
     format: Format,
-    /// Folder for the file, or the file itself [default: standard output]
+    /// Output folder or file [default: standard output]
     #[arg(short, long)]
     output: Option<PathBuf>,
-    /// Stem of the file in the folder of -o [default: the family's name]
+    /// Stem of the file name in the folder given by -o [default: the family's name]
     #[arg(long, value_parser = name, allow_hyphen_values = true)]
     name: Option<String>,
     #[command(flatten)]
@@ -34,12 +34,11 @@ enum Format {
     Rust,
     /// Python module
     Python,
-    /// The family file
+    /// Family file of this program
     Json,
-    /// One hexadecimal word a line
+    /// Text with one hexadecimal code per line
     Txt,
-    /// YAML for cv::FileStorage, with the codes as texts; not an ArUco dictionary, the tags are
-    /// triangular
+    /// YAML for cv::FileStorage, with the codes as strings; not an ArUco dictionary, because the tags are triangular
     Opencv,
 }
 
@@ -53,10 +52,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Format::Txt => ExportFormat::Text,
         Format::Opencv => ExportFormat::OpenCv,
     };
-    anyhow::ensure!(
-        args.name.is_none() || args.output.is_some(),
-        "--name: names the file in the folder of -o, which is not given"
-    );
+    anyhow::ensure!(args.name.is_none() || args.output.is_some(), "--name needs -o");
     let text = export(&family, format);
     match args.output {
         None => output::print(&text)?,

@@ -11,10 +11,10 @@ use deltille::lattice::GridKind;
 use deltille::limits::{MAX_FAMILY_BYTES, read_short_text};
 use deltille_core::words::counted;
 
-/// Told at the end of `--help`.
-pub const HELP: &str = "Codes are the hexadecimal words of the table, in their order; in a text without any, the lines of \
-    nothing but hexadecimal digits. Bits are read row by row from the upper left, in triangles from the apex; a \
-    table of AprilTag 3 says where its bits are. The distance is found by comparing all codes.
+/// Text at the end of `--help`.
+pub const HELP: &str = "The codes are the hexadecimal literals of the table, in order. If there are none, they are the \
+    lines that contain only hexadecimal digits. Bits are read row by row from the upper left, in triangles from the \
+    apex; AprilTag 3 tables define their own bit positions. The distance is computed by comparing all codes.
 
 Examples:
   deltag import tag36h11.c -o families
@@ -23,21 +23,21 @@ Examples:
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// A table of codes: C, Rust or Python source, or a code a line
+    /// Table of codes: C, Rust or Python source, or text with one code per line
     table: PathBuf,
-    /// Shape of the tags; a table of AprilTag 3 says it
+    /// Shape of the tags; AprilTag 3 tables define it
     #[arg(long, value_enum)]
     shape: Option<Shape>,
-    /// Cells of a tag: 9, 16, 25, 36, 49 or 64; a table that has nbits or BITS says it
+    /// Number of cells of a tag: 9, 16, 25, 36, 49 or 64; not needed for tables with nbits or BITS
     #[arg(long, allow_negative_numbers = true, value_parser = whole(1..=64u32))]
     bits: Option<u32>,
-    /// Cells in which any two tags differ, to be less than they do [default: what they do]
+    /// Declared distance between tags, at most the actual one [default: the actual distance]
     #[arg(long, allow_negative_numbers = true, value_parser = whole(1..=64u32))]
     distance: Option<u32>,
-    /// Name of the family [default: the stem of the table's name]
+    /// Name of the family [default: the stem of the table's file name]
     #[arg(long, value_parser = name, allow_hyphen_values = true)]
     name: Option<String>,
-    /// Folder for the family file, or the file itself
+    /// Output folder or file
     #[arg(short, long, default_value = ".")]
     output: PathBuf,
     #[command(flatten)]
@@ -46,9 +46,9 @@ pub struct Args {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Shape {
-    /// DelTags, which turn by 120°
+    /// DelTags, with 120° rotational ambiguity
     Triangle,
-    /// AprilTags and ArUco markers, which turn by 90°
+    /// AprilTags and ArUco markers, with 90° rotational ambiguity
     Square,
 }
 
@@ -59,8 +59,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let name = match args.name {
         Some(given) => given,
-        None => name(&of_file(args.table.file_stem()))
-            .map_err(|problem| anyhow!("{}: {problem}: give --name", args.table.display()))?,
+        None => name(&of_file(args.table.file_stem())).map_err(|problem| {
+            anyhow!("{}: {problem}; set another name with --name", args.table.display())
+        })?,
     };
     let spec = ImportSpec {
         name,

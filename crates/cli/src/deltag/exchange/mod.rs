@@ -1,7 +1,7 @@
-//! Families of and for other programs.
+//! Exchange of families with other programs.
 //!
-//! 1. `import` makes the file of a family from the table of another program.
-//! 2. `export` writes a family as another program reads it.
+//! 1. `import` creates a family file from a table of another program.
+//! 2. `export` writes a family in the format of another program.
 
 pub mod export;
 pub mod import;

@@ -29,7 +29,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     for name in shipped_names() {
         let family = family::resolve(name)?;
         if family.dimension() == dimension && family.distance() == distance {
-            // What its file does not list.
+            // Number of codes by rank, which the file does not list.
             let by_rank = match family.construction() {
                 Construction::Algebraic(construction) => construction.by_rank(dimension, 0),
                 _ => None,
@@ -53,18 +53,21 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }))?;
         return Ok(ExitCode::SUCCESS);
     }
-    say!("no family of {} bits and distance {distance} has more tags than", dimension.bits());
+    say!(
+        "upper bounds on the number of tags with {} bits and distance {distance}",
+        dimension.bits()
+    );
     match linear {
         Some(linear) => say!("{linear:>12}  by linear programming (Delsarte)"),
         None => {
-            say!("{:>12}  by linear programming (Delsarte): nothing that can be checked", "none")
+            say!("{:>12}  by linear programming (Delsarte): no verifiable bound", "none")
         }
     }
     say!("{:>12}  by sphere packing", bounds.sphere_packing);
     if let Some(known) = published {
         say!(
-            "{:>12}  by Brouwer's tables: a third of {} words; the largest code that is known, turned into itself or not, \
-             has {}",
+            "{:>12}  by Brouwer's tables: a third of {} words; the largest known code, whether closed under rotation \
+             or not, has {}",
             known.most_tags,
             known.most_words,
             known.known_words
@@ -72,15 +75,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     if let Some(invariant) = invariant {
         say!(
-            "{invariant:>12}  by semidefinite programming, for codes that a turn leaves as they are"
+            "{invariant:>12}  by semidefinite programming, for codes that are closed under rotation"
         );
     }
     for (name, codes, by_rank) in shipped {
         let share = |codes: f64| 100.0 * codes / least as f64;
-        say!("{codes:>12}  has {name}, {:.1} % of the tightest bound", share(codes as f64));
+        say!("{codes:>12}  in {name}, {:.1} % of the tightest bound", share(codes as f64));
         if let Some(count) = by_rank {
             let share = share(count as f64);
-            say!("{count:>12}  has {name} by rank, before the rules, {share:.1} %");
+            say!("{count:>12}  in {name} by rank, before applying the rules, {share:.1} %");
         }
     }
     Ok(ExitCode::SUCCESS)

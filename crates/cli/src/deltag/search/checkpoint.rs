@@ -1,4 +1,4 @@
-//! A file from which an interrupted search goes on.
+//! Checkpoint files, from which an interrupted search resumes.
 
 use std::cell::RefCell;
 use std::path::Path;
@@ -10,15 +10,15 @@ use serde::{Deserialize, Serialize};
 use crate::output::{self, Overwrite};
 use deltille::limits;
 
-/// The checkpoint file of one search, if it has one.
+/// The optional checkpoint file of a search.
 pub struct CheckpointFile<'a> {
     path: Option<&'a Path>,
-    /// All that decides what the search finds.
+    /// Every setting that affects the result of the search.
     search: String,
     failed: RefCell<Option<anyhow::Error>>,
 }
 
-/// A checkpoint, and of which search it is.
+/// A checkpoint, with the search that it belongs to.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Saved<C> {
@@ -27,13 +27,13 @@ struct Saved<C> {
 }
 
 impl<'a> CheckpointFile<'a> {
-    /// The file at `path` for a search that the text describes in full.
+    /// Creates a checkpoint at `path` for a search that `search` describes completely.
     pub fn new(path: Option<&'a Path>, search: String) -> Self {
         Self { path, search, failed: RefCell::new(None) }
     }
 
-    /// Where the search stood; at its beginning where there is no file. That the file can be
-    /// written is found out now, not after hours.
+    /// Loads the state of the search, or the initial state if there is no file. Writes that initial state, so that an
+    /// unwritable file fails now and not after hours.
     pub fn load<C: Default + Serialize + DeserializeOwned>(&self) -> anyhow::Result<C> {
         let Some(path) = self.path else { return Ok(C::default()) };
         let file = path.display();
@@ -43,7 +43,7 @@ impl<'a> CheckpointFile<'a> {
         }
         let text = limits::read_short_text(path, limits::MAX_FAMILY_BYTES).context("--resume")?;
         let saved: Saved<C> = serde_json::from_str(&text).ok().with_context(|| {
-            format!("--resume: {file} is no checkpoint of this method; remove it to start anew")
+            format!("--resume: {file} is not a checkpoint of this method; remove it to start again")
         })?;
         ensure!(
             saved.search == self.search,
@@ -52,7 +52,7 @@ impl<'a> CheckpointFile<'a> {
         Ok(saved.checkpoint)
     }
 
-    /// Keeps a checkpoint. What goes wrong is told at the end, by [`Self::finish`].
+    /// Saves a checkpoint. Errors are kept and reported at the end, in [`Self::advice`].
     pub fn save<C: Serialize>(&self, checkpoint: &C) {
         if let Some(path) = self.path
             && let Err(error) = self.write(path, checkpoint)
@@ -66,14 +66,17 @@ impl<'a> CheckpointFile<'a> {
         output::write(path, &serde_json::to_vec(&saved)?, Overwrite::default())
     }
 
-    /// How to go on after an interruption.
+    /// Describes how to resume after an interruption.
     pub fn advice(&self) -> String {
         match (self.path, self.failed.borrow().as_ref()) {
             (Some(path), None) => {
-                format!("the same command goes on from the checkpoint {}", path.display())
+                format!(
+                    "run the same command again to resume from the checkpoint {}",
+                    path.display()
+                )
             }
-            (Some(_), Some(error)) => format!("no checkpoint was kept: {error}"),
-            (None, _) => "--resume FILE would keep a checkpoint".to_owned(),
+            (Some(_), Some(error)) => format!("the checkpoint could not be written: {error}"),
+            (None, _) => "use --resume FILE to keep a checkpoint".to_owned(),
         }
     }
 

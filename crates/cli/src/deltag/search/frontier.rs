@@ -11,9 +11,9 @@ use deltille::clock;
 use deltille::family::search::best::{Best, Budget};
 use deltille::family::{RuleChoice, Rules, best_rule, rule_choices};
 
-/// Told at the end of `--help`.
-pub const HELP: &str = "The construction is the best on record, that gen-family starts from. \
-    `gen-family --false-positives` takes the rule that is marked.";
+/// Text at the end of `--help`.
+pub const HELP: &str = "Evaluates the best known construction, the one gen-family starts from. The rule marked \
+    \"chosen\" is the one that `gen-family --false-positives` uses.";
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -25,34 +25,34 @@ pub struct Args {
     telling: Telling,
 }
 
-/// Which of the rules is the best.
+/// Selection of the best rule.
 #[derive(clap::Args)]
 pub struct ChoiceArgs {
-    /// Choose the rule for complexity that leaves the most codes with so many natural false positives
-    /// for each triangle with a border, such as 1e-4, where --corrects cells are corrected
+    /// Select the complexity rule that leaves the most codes at this natural false-positive rate per bordered
+    /// triangle, such as 1e-4, with --corrects cells corrected
     #[arg(long, value_name = "RATE", allow_negative_numbers = true,
           value_parser = crate::values::number(1e-15..=1.0))]
     pub false_positives: Option<f64>,
-    /// Cells that are corrected in a single tag [default: half of what the distance allows]
+    /// Number of cells corrected in a single tag [default: half of what the distance allows]
     #[arg(long, value_name = "CELLS", requires = "false_positives", allow_negative_numbers = true,
           value_parser = crate::values::whole(0..=31u32))]
     pub corrects: Option<u32>,
 }
 
 impl ChoiceArgs {
-    /// Cells that are corrected in a single tag.
+    /// Returns the number of cells corrected in a single tag.
     pub fn corrected(&self, distance: u32) -> anyhow::Result<u32> {
         let most = (distance - 1) / 2;
         let corrected = self.corrects.unwrap_or(most / 2);
         if corrected > most {
             bail!(
-                "--corrects: {corrected} is more than the {most} cells that distance {distance} corrects"
+                "--corrects: {corrected} exceeds the {most} cells that distance {distance} can correct"
             );
         }
         Ok(corrected)
     }
 
-    /// The best of the rules; `None` where none is asked for.
+    /// Returns the best rule, or `None` if no selection was requested.
     pub fn best<'a>(
         &self,
         choices: &'a [RuleChoice],
@@ -62,23 +62,23 @@ impl ChoiceArgs {
         let corrected = self.corrected(distance)?;
         let found = best_rule(choices, corrected, accepted).with_context(|| {
             format!(
-                "--false-positives: with {corrected} corrected no code is so rare in natural pictures; lower --corrects \
-                 or accept more"
+                "--false-positives: no rule reaches this rate in natural images with {corrected} cells corrected; lower \
+                 --corrects or allow a higher rate"
             )
         });
         found.map(Some)
     }
 }
 
-/// What rules for complexity leave of the best construction on record, whose other rules are these.
+/// Evaluates the complexity rules on the best known construction that satisfies the other `rules`.
 pub fn choices(parameters: Parameters, rules: &Rules) -> anyhow::Result<Vec<RuleChoice>> {
     let Parameters { dimension, distance } = parameters;
-    // No time is spent: what is on record is not searched for.
+    // With no time budget, only known constructions are used.
     let budget = Budget::Time(Duration::ZERO, clock::now);
     let any = Rules { min_complexity: 0.0, ..rules.clone() };
     let Some(start) = Best::new(dimension, distance, budget).rules(any).start() else {
         bail!(
-            "no construction of {} bits and distance {distance} is on record: rules are chosen for one that is",
+            "no construction of {} bits and distance {distance} is known, so no rule can be selected",
             dimension.bits()
         );
     };
@@ -105,7 +105,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let corrected: String =
         (0..=(distance - 1) / 2).map(|cells| format!("{:>9}", format!("{cells} corr."))).collect();
-    say!("pairs    codes {corrected}   natural false positives");
+    say!("pairs    codes {corrected}   natural false-positive rate");
     for choice in &choices {
         let rates: String = choice.natural.iter().map(|rate| format!("{rate:>9.1e}")).collect();
         let mark = if best == Some(choice) { "   chosen" } else { "" };

@@ -31,51 +31,49 @@ use deltille::family::{
 use deltille::lattice::Dimension;
 use deltille_core::words::counted;
 
-/// Told at the end of `--help`.
-pub const HELP: &str = "Ctrl-C ends a search early. The methods best and algebraic write \
-    the best family so far (exit code 0). The method search writes what its finished rounds found, \
-    and lexicode nothing (exit code 130). With --resume the same command goes on later, and finds \
-    exactly what it would have found without a break, except by --time, of which it has what is \
-    left. Where nothing was found yet, nothing is written (130). A second Ctrl-C ends the program \
-    at once.";
+/// Text at the end of `--help`.
+pub const HELP: &str = "Ctrl-C ends a search early. The methods best and algebraic then write the best family so far \
+    (exit code 0). The method search writes the result of its finished rounds, and lexicode writes nothing (exit code \
+    130). With --resume, running the same command again continues the search and gives the same result as an \
+    uninterrupted run; with --time, it uses the remaining time. If nothing has been found yet, nothing is written \
+    (130). A second Ctrl-C ends the program immediately.";
 
-/// Told of `--force`.
-pub const FORCE: &str = "Replace a family file also by one with fewer codes, other bits or \
-    another distance, and a file of another kind";
+/// Help text of `--force`.
+pub const FORCE: &str = "Also replace a family file with more codes, other bits or another distance, and files of \
+    other kinds";
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Bits and distance, d<bits>h<distance> with 9, 16, 25, 36, 49 or 64 bits, such as d25h7
+    /// Bits and distance as d<bits>h<distance>, with 9, 16, 25, 36, 49 or 64 bits, such as d25h7
     family: Parameters,
-    /// How to search
+    /// Search method
     #[arg(long, value_enum, default_value_t = Method::Best)]
     method: Method,
-    /// Seconds for the methods best and algebraic, more find larger families [default: 60]; search
-    /// begins no round after them
+    /// Time limit in seconds; for best and algebraic, longer searches find larger families [default: 60]; search
+    /// starts no round after it
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true,
           value_parser = number(0.001..=1e6))]
     time: Option<f64>,
-    /// Steps of work for the methods best and algebraic instead of a time: the same seed gives the
-    /// same codes on every machine
+    /// Number of work steps for best and algebraic, instead of a time limit: the same seed gives the same codes on
+    /// every machine
     #[arg(long, value_name = "STEPS", conflicts_with = "time", allow_negative_numbers = true,
           value_parser = whole(1..=1_000_000u32))]
     work: Option<u32>,
-    /// For the methods best and algebraic: do not start from the family that ships, but search from
-    /// nothing
+    /// Start from nothing instead of the shipped family (methods best and algebraic)
     #[arg(long)]
     from_nothing: bool,
-    /// For the methods best and algebraic: no search, but what is on record as far as it satisfies the
-    /// rules, after the codes of this family, which keep their ids
+    /// Extend this family without a search: keep its codes and ids, and append the known codes that satisfy the rules
+    /// (methods best and algebraic)
     #[arg(long, value_name = "FAMILY", conflicts_with_all = ["time", "work", "from_nothing", "seed"])]
     extend: Option<String>,
-    /// Seed of the random choices of best, algebraic and search [default: 1]
+    /// Seed of the random number generator of best, algebraic and search [default: 1]
     #[arg(long, allow_negative_numbers = true, value_parser = whole(0..=u64::MAX))]
     seed: Option<u64>,
-    /// Rounds of the method search, at most [default: 3; with --time as many as it gives]
+    /// Largest number of rounds of the method search [default: 3, or unlimited with --time]
     #[arg(long, allow_negative_numbers = true, value_parser = whole(1..=1_000_000u32))]
     rounds: Option<u32>,
-    /// Number of codes at most, for the methods best and algebraic [default: as many as a file of
-    /// 64 MiB holds, of 49 and 64 bits with --robust-to 20,000]
+    /// Largest number of codes, for best and algebraic [default: as many as fit in a file of 64 MiB; 20,000 for 49
+    /// and 64 bits with --robust-to]
     #[arg(long, value_name = "CODES", allow_negative_numbers = true,
           value_parser = whole(1..=u64::MAX))]
     limit: Option<u64>,
@@ -83,18 +81,18 @@ pub struct Args {
     rules: RuleArgs,
     #[command(flatten)]
     choice: ChoiceArgs,
-    /// Keep a checkpoint in this file, and go on from it if it is there; removed at the end
+    /// Save checkpoints to this file, and resume from it if it exists; removed at the end
     #[arg(long, value_name = "FILE")]
     resume: Option<PathBuf>,
-    /// Name of the family, also the stem of its file [default: as the bits and distance]
+    /// Name of the family, also the stem of its file [default: derived from the bits and distance]
     #[arg(long, value_parser = name, allow_hyphen_values = true)]
     name: Option<String>,
-    /// Folder for the file, or the file itself
+    /// Output folder or file
     #[arg(short, long, default_value = "families")]
     output: PathBuf,
     #[command(flatten)]
     overwrite: Overwrite,
-    /// Threads [default: one per processor]
+    /// Number of threads [default: one per processor]
     #[arg(short = 'j', long, value_name = "N", allow_negative_numbers = true,
           value_parser = whole(1..=1024u16))]
     threads: Option<u16>,
@@ -102,28 +100,28 @@ pub struct Args {
 
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 enum Method {
-    /// The best codes on record and others, arranged and improved by local search, within --time
+    /// Known and other codes, arranged and improved by local search within --time
     Best,
-    /// Algebraic codes arranged within --time, without local search
+    /// Algebraic codes, arranged within --time without local search
     Algebraic,
-    /// Local search from nothing, up to 25 bits; the same for the same seed and rounds
+    /// Local search from nothing, up to 25 bits; reproducible for the same seed and number of rounds
     Search,
-    /// The construction of the published families, up to 36 bits
+    /// Construction of the published families, up to 36 bits
     Lexicode,
 }
 
 impl Method {
-    /// The name as it is typed.
+    /// Returns the name as typed on the command line.
     fn name(self) -> String {
         format!("{self:?}").to_lowercase()
     }
 }
 
-/// What became of a search.
+/// Result of a search.
 struct Outcome {
-    /// The codes, if there are any to be written.
+    /// The codes, if any are to be written.
     family: Option<Family>,
-    /// What to say of an interruption.
+    /// Message about an interruption.
     interrupted: Option<String>,
     exit: ExitCode,
 }
@@ -137,7 +135,7 @@ impl Outcome {
         Self { family, interrupted: Some(message), exit: ExitCode::from(interrupt::exit_code()) }
     }
 
-    /// What became of a search with checkpoints that ended before it found anything.
+    /// Creates the result of a search with checkpoints that ended without any codes.
     fn nothing(error: FamilyError, file: &CheckpointFile) -> anyhow::Result<Self> {
         match error {
             FamilyError::Cancelled => {
@@ -154,7 +152,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Parameters { dimension, distance } = args.family;
     let name = args.name.clone().unwrap_or_else(|| format!("d{}h{distance}", dimension.bits()));
     let path = output::file(&args.output, &name, "json")?;
-    interrupt::stands("nothing was found yet, and nothing was written");
+    interrupt::stands("nothing was found yet; nothing was written");
     if let Err(FamilyError::Claim { problem, .. }) = check_name(&name, dimension, distance) {
         bail!("--name: {problem}");
     }
@@ -183,14 +181,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
     let mut path = path;
     if let Some(family) = &family {
-        // What took hours is not lost, and neither is what was there.
+        // Keeps both the existing file and the result of a long search.
         if let Some(there) =
             there(&path).filter(|f| !args.overwrite.is_forced() && f.len() > family.len())
         {
             let beside = free_name(&path);
             tell!(
-                "error: {} keeps its {} codes, more than these {}, which go to {}; --force replaces \
-                 it, -o names another place",
+                "error: {} was kept, because its {} codes are more than the {} found, which were written to {}; use \
+                 --force to replace it, or -o to set another path",
                 path.display(),
                 there.len(),
                 family.len(),
@@ -208,7 +206,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     if let Some(family) = family.as_ref().filter(|f| !is_whole && f.len() > PAIRS_COUNTED) {
         say!(
-            "{}: {} of {} bits, which `deltag verify-family` proves; fingerprint {}",
+            "{}: {} of {} bits; verify with `deltag verify-family`; fingerprint {}",
             path.display(),
             counted(family.len(), "code"),
             dimension.bits(),
@@ -229,7 +227,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(exit)
 }
 
-/// The codes on record after those of an older family.
+/// Appends the known codes to those of an older family.
 fn extended_by(
     name: &str,
     best: &Best,
@@ -237,34 +235,34 @@ fn extended_by(
     older: &str,
 ) -> anyhow::Result<Family> {
     let older = resolve(older).context("--extend")?;
-    let Some(start) = start else { bail!("--extend: nothing is on record to extend with") };
+    let Some(start) = start else { bail!("--extend: no known codes to extend the family with") };
     match best.family_of(name, start)?.extending(&older) {
         Err(FamilyError::Field { problem, .. }) => {
-            bail!("--extend: {problem}; their ids could not stay")
+            bail!("--extend: {problem}, so the ids could not be kept")
         }
         extended => Ok(extended?),
     }
 }
 
-/// The family that a file holds, if it holds one.
+/// Reads the family in a file, if it contains one.
 fn there(path: &Path) -> Option<Family> {
     path.exists().then(|| family::read(path).ok()).flatten()
 }
 
-/// A name beside that of a file, with a number, that nothing has yet.
+/// Returns an unused path beside a file, made unique by a number.
 fn free_name(path: &Path) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let numbered = (2u32..).map(|n| path.with_file_name(format!("{stem}-{n}.json")));
     numbered.into_iter().find(|path| !path.exists()).unwrap_or_else(|| path.to_owned())
 }
 
-/// Size of a family file at most: 64 MiB, of which a little is for what is not codes.
+/// Largest size of the codes in a family file: 64 MiB, less 64 KiB for everything else.
 pub const FILE_LIMIT: u64 = (64 << 20) - (64 << 10);
 
-/// Codes of 49 and 64 bits that are listed where cells may be hidden.
+/// Largest number of codes of 49 and 64 bits that are listed if cells may be hidden.
 const ROBUST_LIMIT: u64 = 20_000;
 
-/// Length of a code's line: four spaces, quotes, 0x, digits, comma, line feed.
+/// Length of a code's line: four spaces, quotes, 0x, digits, comma and line feed.
 pub fn bytes_per_code(dimension: Dimension) -> u64 {
     u64::from(dimension.bits().div_ceil(4)) + 10
 }
@@ -278,9 +276,9 @@ impl Args {
         self.seed.unwrap_or(1)
     }
 
-    /// Refuses to lose a file of other tags, or one that is no family file at all.
+    /// Refuses to replace a file of other tags, or one that is not a family file.
     fn check_replaced(&self, path: &Path) -> anyhow::Result<()> {
-        // Before the hours that a search takes.
+        // Checked before a search that may take hours.
         self.overwrite.check(path, &Kind::of_schema(family::SCHEMA))?;
         if self.overwrite.is_forced() || !path.exists() {
             return Ok(());
@@ -292,17 +290,17 @@ impl Args {
                 Ok(())
             }
             Some(family) => bail!(
-                "-o: {file} holds {} codes of {} bits, distance {}; --force replaces it, --name \
-                 gives another name",
+                "-o: {file} contains {} codes of {} bits, distance {}; use --force to replace it, or --name to set \
+                 another name",
                 family.len(),
                 family.dimension().bits(),
                 family.distance()
             ),
-            None => bail!("-o: {file} is no family file; --force replaces it"),
+            None => bail!("-o: {file} is not a family file; use --force to replace it"),
         }
     }
 
-    /// The rules asked for; with `--false-positives` that for complexity is the best for the construction on record.
+    /// Returns the rules; with `--false-positives`, the complexity rule is the best one for the known construction.
     fn chosen_rules(&self) -> anyhow::Result<Rules> {
         let rules = self.rules.rules(self.family)?;
         if self.choice.false_positives.is_none() {
@@ -310,18 +308,18 @@ impl Args {
         }
         ensure!(
             !self.rules.has_complexity(),
-            "--false-positives: chooses the complexity; leave --min-complexity out"
+            "--false-positives sets the complexity; remove --min-complexity"
         );
         ensure!(
             !self.rules.has_free_cells(),
-            "--false-positives: is about tags without free cells; leave --free out, or choose with --min-complexity"
+            "--false-positives does not support free cells; remove --free, or use --min-complexity"
         );
         let distance = self.family.distance;
         let choices = frontier::choices(self.family, &rules)?;
         let Some(best) = self.choice.best(&choices, distance)? else { return Ok(rules) };
         let corrected = self.choice.corrected(distance)?;
         tell!(
-            "rule: {} pairs of cells differ at least, which {} of the codes on record satisfy; natural false positives {:.1e} with \
+            "rule: at least {} pairs of cells differ, satisfied by {} of the known codes; natural false-positive rate {:.1e} with \
              {corrected} corrected",
             best.min_pairs,
             best.codes,
@@ -330,7 +328,7 @@ impl Args {
         Ok(Rules { min_complexity: best.min_complexity, ..rules })
     }
 
-    /// Refuses what the method would ignore or cannot do.
+    /// Rejects options that the method ignores or does not support.
     fn check_options(&self) -> anyhow::Result<()> {
         use Method::{Algebraic, Best, Lexicode, Search};
         let method = self.method;
@@ -341,7 +339,7 @@ impl Args {
             let [last, others @ ..] = methods else { return Ok(()) };
             let others: String = others.iter().map(|m| m.name() + " and ").collect();
             bail!(
-                "{option}: does nothing with --method {}, only with {others}{}; leave it out",
+                "{option} has no effect with --method {}, only with {others}{}; remove it",
                 method.name(),
                 last.name()
             )
@@ -355,12 +353,12 @@ impl Args {
         refuse("--rounds", self.rounds.is_some(), &[Search])?;
         ensure!(
             self.seed.is_none() || method != Lexicode,
-            "--seed: a lexicode has no random choices; leave it out"
+            "--seed has no effect on a lexicode; remove it"
         );
         let bits = self.family.dimension.bits();
         ensure!(
             !(method == Lexicode && bits > 25 && self.rules.is_robust()),
-            "--robust-to: a lexicode takes it up to 25 bits, not with {bits}; use --method best"
+            "--robust-to: lexicodes support it up to 25 bits, not with {bits}; use --method best"
         );
         let limit = match method {
             Search => 25,
@@ -369,13 +367,13 @@ impl Args {
         };
         ensure!(
             bits <= limit,
-            "--method {}: works up to {limit} bits, not with {bits}; use best or algebraic",
+            "--method {} supports up to {limit} bits, not {bits}; use best or algebraic",
             method.name()
         );
         Ok(())
     }
 
-    /// All that decides what a search with checkpoints finds.
+    /// Returns every setting that affects the result of a search with checkpoints.
     fn identity(&self, rules: &Rules) -> String {
         let Parameters { dimension, distance } = self.family;
         let seed = match self.method {
@@ -429,7 +427,7 @@ impl Args {
         let mut checkpoint: search::Checkpoint = file.load()?;
         ensure!(
             checkpoint.rounds_done <= search.rounds,
-            "--rounds: the checkpoint of --resume has {} rounds already",
+            "--rounds: the checkpoint of --resume already has {} rounds",
             checkpoint.rounds_done
         );
         let start = Instant::now();
@@ -451,7 +449,7 @@ impl Args {
             }
             Err(FamilyError::Cancelled) if !checkpoint.codes.is_empty() => {
                 let message = format!(
-                    "kept what {rounds} of {} rounds found; {}",
+                    "wrote the result of {rounds} of {} rounds; {}",
                     search.rounds,
                     file.advice()
                 );
@@ -469,7 +467,7 @@ impl Args {
         control: Control,
     ) -> anyhow::Result<Outcome> {
         let Parameters { dimension, distance } = self.family;
-        // With hidden cells every code is compared with all that were taken before.
+        // With hidden cells, every code is compared with all previous ones.
         let most = match rules.robust.as_slice() {
             [] => FILE_LIMIT / bytes_per_code(dimension),
             _ => ROBUST_LIMIT,
@@ -486,7 +484,7 @@ impl Args {
         if let Some(steps) = self.work {
             ensure!(
                 checkpoint.legs_done <= steps,
-                "--work: the checkpoint of --resume has {} steps already",
+                "--work: the checkpoint of --resume already has {} steps",
                 checkpoint.legs_done
             );
         }
@@ -495,11 +493,11 @@ impl Args {
         let extended = extended.map(|older| extended_by(name, &best, start.as_ref(), older));
         let extended = extended.transpose()?;
         if checkpoint.construction.is_some() {
-            tell!("goes on from {} of the checkpoint", counted(checkpoint.codes.len(), "code"));
+            tell!("resuming from {} of the checkpoint", counted(checkpoint.codes.len(), "code"));
         } else if let Some(start) = &start {
             let codes = best.family_of(name, start)?;
             let proof = proof_of(&certify_codes(&codes), distance);
-            tell!("starts from {} of {}: {proof}", counted(codes.len(), "code"), start.family);
+            tell!("starting from {} of {}: {proof}", counted(codes.len(), "code"), start.family);
         }
         if let Some(family) = extended {
             return Ok(Outcome::whole(family));
@@ -508,17 +506,17 @@ impl Args {
         match best.resume(name, start, &mut checkpoint, &|c| file.save(c), control) {
             Ok(family) if stopped() => Ok(Outcome {
                 family: Some(family),
-                interrupted: Some(format!("kept the best family so far; {}", file.advice())),
+                interrupted: Some(format!("wrote the best family so far; {}", file.advice())),
                 exit: ExitCode::SUCCESS,
             }),
             Ok(family) => Ok(Outcome::whole(family)),
             Err(FamilyError::Cancelled) if stopped() => {
-                let message = "nothing was found yet, and nothing was written".to_owned();
+                let message = "nothing was found yet; nothing was written".to_owned();
                 Ok(Outcome::interrupted(None, message))
             }
-            // The time was over before there was a code.
+            // The time limit passed before the first code was found.
             Err(FamilyError::Cancelled) => Err(self.none_found()),
-            // The name and the rules were checked before: it is the codes that are missing.
+            // The name and the rules have been checked, so the codes are missing.
             Err(FamilyError::Field { field, .. }) if field == "codes" => Err(self.none_found()),
             Err(error) => Err(error.into()),
         }
@@ -531,8 +529,8 @@ impl Args {
     fn none_found(&self) -> anyhow::Error {
         let Parameters { dimension, distance } = self.family;
         anyhow::anyhow!(
-            "no word of {} bits was found that satisfies the rules at distance {distance}; take a \
-             smaller distance, or loosen the rules, such as with --min-complexity",
+            "no word of {} bits satisfies the rules at distance {distance}; use a smaller distance, or relax the \
+             rules (for example with --min-complexity)",
             dimension.bits()
         )
     }

@@ -1,13 +1,13 @@
-//! New families: from bits and a distance to a file.
+//! New families: from bits and a distance to a family file.
 //!
-//! Comes in: what a family has to do, and which codes its rules refuse. Goes out: the file of a family, compared with what
-//! it claims. A user meets the files in this order:
+//! Input: requirements and rules. Output: a family file whose claims have been verified. The modules, in the order in
+//! which a user meets them:
 //!
-//! 1. `plan` names the smallest shipped family that suffices, which spares a search.
-//! 2. `parameters` are bits and distance, as in d25h7; `bounds` says how large such a family could be.
-//! 3. `rules` are those of a search, by options or a file; `frontier` says what rules leave of a construction.
-//! 4. `gen_family` searches, and writes what it found.
-//! 5. `checkpoint` is the file from which an interrupted search goes on.
+//! 1. `plan` finds the smallest shipped family that suffices, which avoids a search.
+//! 2. `parameters` parses bits and distance, as in d25h7. `bounds` computes how large a family can be.
+//! 3. `rules` reads the rules of a search from options or a file. `frontier` evaluates rules on a construction.
+//! 4. `gen_family` runs the search and writes the result.
+//! 5. `checkpoint` stores the file from which an interrupted search resumes.
 
 pub mod bounds;
 mod checkpoint;

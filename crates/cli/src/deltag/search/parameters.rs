@@ -2,7 +2,7 @@ use std::str::FromStr;
 
 use deltille::lattice::Dimension;
 
-/// Bits and distance, written d25h7.
+/// Bits and distance, written as d25h7.
 #[derive(Clone, Copy)]
 pub struct Parameters {
     pub dimension: Dimension,
@@ -17,11 +17,10 @@ impl FromStr for Parameters {
             .strip_prefix('d')
             .and_then(|rest| rest.split_once('h'))
             .and_then(|(b, h)| Some((b.parse().ok()?, h.parse().ok()?)))
-            .ok_or("write bits and distance such as d25h7")?;
+            .ok_or("expected bits and distance, such as d25h7")?;
         if format!("d{bits}h{distance}") != text {
-            return Err(
-                "write bits and distance without signs and leading zeros, such as d25h7".to_owned()
-            );
+            return Err("expected bits and distance without signs or leading zeros, such as d25h7"
+                .to_owned());
         }
         let dimension = Dimension::from_bits(bits).map_err(|e| e.to_string())?;
         if !(1..=bits).contains(&distance) {

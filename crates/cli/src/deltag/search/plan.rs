@@ -14,15 +14,15 @@ use deltille_core::words::counted;
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Faces of the target, or boards
+    /// Number of faces of the target, or of boards
     #[arg(long, default_value_t = 1, allow_negative_numbers = true,
           value_parser = whole(1..=u32::MAX))]
     faces: u32,
-    /// Tags on each
+    /// Number of tags on each face
     #[arg(long, default_value_t = 10, allow_negative_numbers = true,
           value_parser = whole(1..=u32::MAX))]
     tags_per_face: u32,
-    /// Misread cells that must be corrected in a tag, at least
+    /// Smallest number of misread cells to correct per tag
     #[arg(long, value_name = "CELLS", default_value_t = 0, allow_negative_numbers = true,
           value_parser = whole(0..=31u32))]
     corrects: u32,
@@ -37,13 +37,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     families.retain(|family| family.correctable() >= args.corrects);
     let largest = families.iter().max_by_key(|f| f.len());
     let Some(largest) = largest else {
-        anyhow::bail!("--corrects {}: no shipped family corrects so many cells", args.corrects);
+        anyhow::bail!("--corrects {}: no shipped family corrects this many cells", args.corrects);
     };
     let Some(best) = smallest_shipped(GridKind::Deltille, needed, args.corrects) else {
         let (name, len) = (largest.name(), largest.len());
         let listed = FILE_LIMIT / bytes_per_code(largest.dimension());
         let instead = if largest.dimension().bits() >= 49 && needed <= listed / 2 {
-            format!("`deltag gen-family {name}` makes a file with more, or lower")
+            format!("create a larger file with `deltag gen-family {name}`, or lower")
         } else {
             "lower".to_owned()
         };
@@ -52,7 +52,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             n => (format!(" that correct {}", counted(n as usize, "cell")), " or --corrects"),
         };
         anyhow::bail!(
-            "{needed} tags{kind}: the largest shipped family, {name}, lists {len}; {instead} \
+            "{needed} tags{kind}: the largest shipped family, {name}, has {len}; {instead} \
              --faces or --tags-per-face{corrects}"
         );
     };
@@ -70,14 +70,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         args.tags_per_face,
         about(&Family::shipped(best.name)?)
     );
-    // What more bits would buy.
+    // The next family, which corrects more with more bits.
     if let Some(more) = more {
-        say!("to correct more, with smaller cells: {}", about(&Family::shipped(more.name)?));
+        say!("to correct more errors, with smaller cells: {}", about(&Family::shipped(more.name)?));
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// A family as `--json` has it.
+/// Describes a family for `--json`.
 fn of(family: &ShippedFamily) -> anyhow::Result<Value> {
     let mut told = serde_json::json!({
         "name": family.name, "bits": family.bits, "distance": family.distance,
@@ -93,8 +93,8 @@ fn about(family: &Family) -> String {
     let last = |rates: &[f64]| rates.last().copied().unwrap_or_default();
     let [coins, natural] = [last(&coins), last(rates.as_deref().unwrap_or_default())];
     format!(
-        "{}, {} codes of {} bits, distance {}; corrects {} cells, then takes for a tag a word of fair coins with \
-         probability {coins:.1e}, a bordered triangle of a natural picture with {natural:.1e} (within a factor of {NATURAL_FACTOR}); {}",
+        "{}, {} codes of {} bits, distance {}; corrects {} cells, with false-positive rate {coins:.1e} for random bits and \
+         {natural:.1e} for a bordered triangle in natural images (within a factor of {NATURAL_FACTOR}); {}",
         family.name(),
         family.len(),
         family.dimension().bits(),

@@ -10,27 +10,26 @@ use deltille::limits;
 
 #[derive(clap::Args)]
 pub struct RuleArgs {
-    /// Share of edge-adjacent cell pairs that must differ in every code, 0 to 1 [default: 0.5]
+    /// Fraction of edge-adjacent cell pairs that must differ in every code, 0 to 1 [default: 0.5]
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true,
           value_parser = crate::values::number(0.0..=1.0))]
     min_complexity: Option<f64>,
-    /// White cells that every code must have [default: the distance]
+    /// Smallest number of white cells in every code [default: the distance]
     #[arg(long, value_name = "CELLS", allow_negative_numbers = true,
           value_parser = crate::values::whole(0..=64u32))]
     black_distance: Option<u32>,
-    /// Keep codes at the family's distance from the all-white tile too
+    /// Also keep codes at the family's distance from the all-white tile
     #[arg(long)]
     reject_white: bool,
-    /// Keep codes apart also where cells are hidden: apex, the 4 cells of any corner, edge, those along
-    /// any edge, or tile, any 4 in a triangle; in at least 3 of the others, or as in edge=5.
+    /// Keep codes distinct when cells are hidden: apex (the 4 cells of any corner), edge (the cells along any edge)
+    /// or tile (any 4 cells in a triangle); they still differ in at least 3 cells, or as many as given (edge=5).
     /// Repeatable
     #[arg(long, value_name = "CELLS[=DISTANCE]")]
     robust_to: Vec<Robust>,
-    /// Leave cells free that no code uses, for a hole: those of the centre, one, or of 9 and 36 bits six
+    /// Leave the centre cells unused, for a hole: one cell, or six with 9 and 36 bits
     #[arg(long, value_name = "centre")]
     free: Option<FreeCells>,
-    /// TOML file with min_complexity, black_distance, white_distance, robust, free; options given here
-    /// win
+    /// TOML file with min_complexity, black_distance, white_distance, robust and free; options take precedence
     #[arg(long, value_name = "FILE")]
     rules: Option<PathBuf>,
 }
@@ -41,17 +40,17 @@ impl RuleArgs {
         self.min_complexity.is_some()
     }
 
-    /// Whether codes are to be known with cells hidden.
+    /// Whether codes must be distinct with cells hidden.
     pub fn is_robust(&self) -> bool {
         !self.robust_to.is_empty()
     }
 
-    /// Whether cells are left free.
+    /// Whether cells are left unused.
     pub fn has_free_cells(&self) -> bool {
         self.free.is_some()
     }
 
-    /// The rules asked for, checked for the bits of the family.
+    /// Returns the rules, checked against the number of bits.
     pub fn rules(&self, parameters: Parameters) -> anyhow::Result<Rules> {
         let Parameters { dimension, distance } = parameters;
         let bits = dimension.bits();
@@ -84,7 +83,7 @@ fn check(rules: &Rules, bits: u32, place: impl Fn(&str) -> String) -> anyhow::Re
     }
 }
 
-/// Takes the fields of a rules file.
+/// Reads the fields of a rules file.
 fn read(path: &Path, rules: &mut Rules) -> anyhow::Result<()> {
     let file = path.display();
     let text = limits::read_short_text(path, limits::MAX_SETTINGS_BYTES).context("--rules")?;
@@ -92,14 +91,14 @@ fn read(path: &Path, rules: &mut Rules) -> anyhow::Result<()> {
         let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
         let line = 1 + before.matches('\n').count();
         anyhow::anyhow!(
-            "{file}: line {line} is not TOML ({}): write lines such as min_complexity = 0.5",
+            "{file}: line {line} is not valid TOML ({}); expected lines such as min_complexity = 0.5",
             error.message()
         )
     })?;
     for (field, value) in &table {
         let cells = || {
             value.as_integer().and_then(|v| u32::try_from(v).ok()).with_context(|| {
-                format!("{file}: field `{field}`: {value} is not a number of cells such as 7")
+                format!("{file}: field `{field}`: {value} is not a number of cells, such as 7")
             })
         };
         match field.as_str() {
@@ -128,8 +127,8 @@ fn read(path: &Path, rules: &mut Rules) -> anyhow::Result<()> {
                 })?;
             }
             _ => bail!(
-                "{file}: unknown field `{field}`: there are min_complexity, black_distance, \
-                 white_distance, robust and free"
+                "{file}: unknown field `{field}` (known: min_complexity, black_distance, white_distance, robust, \
+                 free)"
             ),
         }
     }

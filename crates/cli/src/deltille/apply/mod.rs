@@ -1,10 +1,10 @@
-//! Calibrated cameras put to use.
+//! Applications of calibrated cameras.
 //!
-//! Comes in: photographs, and the camera or rig that took them. Goes out:
+//! Input: photographs, and the camera or rig that took them. Output:
 //!
-//! 1. from `pose`, where a target is in each photograph;
-//! 2. from `undistort`, photographs as a pinhole would have taken them, or the maps for that; for two cameras of a rig
-//!    rectified, which is `deltille rectify`.
+//! 1. `pose`: the pose of a target in each photograph;
+//! 2. `undistort`: photographs undistorted to a pinhole projection, or the remap tables; for two cameras of a rig,
+//!    rectified images (`deltille rectify`).
 
 pub mod pose;
 pub mod undistort;

@@ -28,27 +28,26 @@ pub struct Args {
     /// Photographs: files, folders, patterns, or - for a list on standard input
     #[arg(required = true, value_name = "IMAGES")]
     images: Vec<PathBuf>,
-    /// Description of the target: the .json that was written with it, or a .dsc; may be given for each of several
-    /// targets
+    /// Target description: the .json written with the target, or a .dsc; repeatable for several targets
     #[arg(long, required_unless_present = "grid", value_name = "FILE")]
     target: Vec<PathBuf>,
     #[command(flatten)]
     grid: GridArgs,
-    /// The camera, as `deltille calibrate`, ROS or OpenCV write it
+    /// Camera file of `deltille calibrate`, ROS or OpenCV
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
-    /// Use --target even where the camera was calibrated with a board of the same tags at another size
+    /// Use --target even if the camera was calibrated with a board of the same tags at another size
     #[arg(long)]
     assume_target: bool,
     #[command(flatten)]
     sheet: SheetArgs,
-    /// Family file, where the target names a family that is not shipped
+    /// Family file, if the target uses a family that does not ship with the program
     #[arg(long)]
     family: Option<String>,
-    /// Write a line for every picture, and of several targets for each: where there is no pose, camera_from_target is null, and reason says why
+    /// Write a line for every image and target: without a pose, camera_from_target is null and reason explains why
     #[arg(long)]
     every_picture: bool,
-    /// Write the lines to a file instead of standard output
+    /// Write to a file instead of standard output
     #[arg(short, long, value_name = "FILE.ndjson")]
     output: Option<PathBuf>,
     #[command(flatten)]
@@ -57,7 +56,7 @@ pub struct Args {
     overwrite: Overwrite,
 }
 
-/// Finds the target in each image and says where it is, a line of JSON each.
+/// Detects the target in each image and writes its pose as a line of JSON.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
     let printed = match args.grid.read_target()? {
@@ -68,7 +67,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     target_file::set_families(&mut targets, args.family.as_deref())?;
     let sheet = args.sheet.read(&limits, &Reference::Scene(&targets).identities(), &printed)?;
     if let [_, _, ..] = targets.as_slice() {
-        // Refuses what is known of one sheet alone.
+        // Rejects sheet options that apply to a single sheet.
         sightings::panels(&Reference::Scene(&targets), &sheet)?;
     }
     let each: Vec<&Target> = targets.iter().collect();
@@ -110,7 +109,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                             of_image += &views.map(line).collect::<String>();
                         }
                         Err(why) => {
-                            // Of several targets a picture need not show all.
+                            // With several targets, an image need not show all of them.
                             if !is_there {
                                 tell!("{}: {}{why}", image.display(), finder.of_target(target));
                             }
@@ -129,19 +128,19 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
     }
     if all == 0 {
-        bail!("there is no image");
+        bail!("no images to process");
     }
     if unread == all {
         bail!("no image could be read");
     }
     if let Some(path) = &path {
         output::write(path, lines.as_bytes(), args.overwrite)?;
-        say!("{}: {} of {all} images show the target", path.display(), all - without);
+        say!("{}: target found in {} of {all} images", path.display(), all - without);
     }
     Ok(if without > 0 { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })
 }
 
-/// Finds targets in pictures of a known camera.
+/// Finds targets in images of a known camera.
 struct Finder {
     detector: Detector,
     camera: Camera,
@@ -150,16 +149,16 @@ struct Finder {
     limits: Limits,
 }
 
-/// What a picture shows.
+/// Result of one image.
 enum Seen {
-    /// Of each target its pose, or why there is none.
+    /// The pose of each target, or the reason why there is none.
     Targets(Vec<Result<Estimate, String>>),
-    /// The picture cannot be read, and why.
+    /// The image could not be read, with the reason.
     Unread(String),
 }
 
 impl Finder {
-    /// What a sentence about a target begins with where there are several.
+    /// Prefix of messages about a target, if there are several.
     fn of_target(&self, target: &Target) -> String {
         match self.targets.len() {
             1 => String::new(),
@@ -177,7 +176,7 @@ impl Finder {
         Ok(Seen::Targets(found.collect::<anyhow::Result<_>>()?))
     }
 
-    /// The pose of a target in a picture, or why there is none.
+    /// Computes the pose of a target in an image, or returns the reason why there is none.
     fn pose(
         &self,
         target: &Target,
@@ -192,7 +191,7 @@ impl Finder {
         let found = calibration.located(&seen[0].1).with_context(|| image.display().to_string())?;
         let Ok(found) = found else { return Ok(found) };
         let (words, said) = (Words::new(&found, None), found.diagnose());
-        // Where the lens ends is the camera's, and the same for every picture.
+        // The limit of the lens is a property of the camera, equal for all images.
         for diagnosis in said.iter().filter(|said| !matches!(said, Diagnosis::LensEnds { .. })) {
             let of_target = self.of_target(target);
             tell!("{}: {of_target}{}", image.display(), words.sentence(diagnosis));

@@ -28,23 +28,23 @@ use deltille::photograph;
 use deltille::remap::remapped;
 use deltille_core::words::counted;
 
-/// How the views are made.
+/// Options of the output views.
 #[derive(clap::Args)]
 struct ViewArgs {
-    /// How much is shown: inside, as much as leaves nothing black; whole, all that the camera sees, up to 150°; a
-    /// horizontal field of view such as 90deg; or a focal length such as 800px
+    /// Field of view: inside (as large as possible without black pixels), whole (everything the camera sees, up to
+    /// 150°), a horizontal angle such as 90deg, or a focal length such as 800px
     #[arg(long, value_name = "FIELD", default_value = "inside", value_parser = field)]
     field: Field,
-    /// Width and height of the new pictures, px, such as 1280x960 [default: those of the camera]
+    /// Width and height of the output images in px, such as 1280x960 [default: those of the camera]
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
-    /// Distance for which pictures of a lens of the pupil model are right, such as 2m [default: infinity]
+    /// Distance at which images of a pupil-model lens are exact, such as 2m [default: infinity]
     #[arg(long, value_name = "LENGTH", value_parser = distance)]
     distance: Option<f64>,
-    /// Write the maps for OpenCV's remap too, as arrays of float32 for NumPy
+    /// Also write the remap tables for OpenCV's remap, as float32 arrays for NumPy
     #[arg(long)]
     maps: bool,
-    /// Folder for the results
+    /// Output folder
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
     #[command(flatten)]
@@ -56,11 +56,11 @@ struct ViewArgs {
 /// Arguments of `deltille undistort`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Photographs that the camera took: files, folders, patterns, or - for a list on standard input; without, the new
-    /// camera and the maps are made
+    /// Photographs taken by the camera: files, folders, patterns, or - for a list on standard input; without any,
+    /// only the new camera and the remap tables are written
     #[arg(value_name = "IMAGES")]
     images: Vec<PathBuf>,
-    /// The camera, as `deltille calibrate`, ROS or OpenCV write it
+    /// Camera file of `deltille calibrate`, ROS or OpenCV
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
     #[command(flatten)]
@@ -70,13 +70,13 @@ pub struct Args {
 /// Arguments of `deltille rectify`.
 #[derive(clap::Args)]
 pub struct PairArgs {
-    /// The rig: the .json of `deltille rig`
+    /// Rig file: the .json of `deltille rig`
     #[arg(value_name = "RIG")]
     rig: PathBuf,
     /// Names of the two cameras, such as left,right
     #[arg(long, value_name = "NAME,NAME", value_parser = pair)]
     pair: [String; 2],
-    /// Photographs of the first camera: a file, a folder or a pattern
+    /// Photographs of the first camera: files, folders or patterns
     #[arg(long, value_name = "IMAGES")]
     first: Vec<PathBuf>,
     /// Photographs of the second camera
@@ -94,9 +94,11 @@ fn field(text: &str) -> Result<Field, String> {
         (_, Some(degrees), _) if degrees > 0.0 && degrees < 180.0 => {
             Ok(Field::Horizontal(degrees.to_radians()))
         }
-        (_, Some(_), _) => Err("a pinhole sees more than 0° and less than 180°".to_owned()),
+        (_, Some(_), _) => {
+            Err("the field of view of a pinhole must be more than 0° and less than 180°".to_owned())
+        }
         (_, _, Some(focal)) if (1.0..=1e6).contains(&focal) => Ok(Field::Focal(focal)),
-        _ => Err("give inside, whole, an angle such as 90deg, or a focal length such as 800px"
+        _ => Err("expected inside, whole, an angle such as 90deg, or a focal length such as 800px"
             .to_owned()),
     }
 }
@@ -106,7 +108,7 @@ fn size(text: &str) -> Result<[u32; 2], String> {
         |text: &str| text.parse().ok().filter(|side| (2..=u32::from(u16::MAX)).contains(side));
     let sides =
         text.split_once('x').and_then(|(width, height)| Some([side(width)?, side(height)?]));
-    sides.ok_or_else(|| format!("`{text}` is no width and height in px, such as 1280x960"))
+    sides.ok_or_else(|| format!("`{text}` is not a valid width and height in px, such as 1280x960"))
 }
 
 fn pair(text: &str) -> Result<[String; 2], String> {
@@ -114,12 +116,12 @@ fn pair(text: &str) -> Result<[String; 2], String> {
         Some((first, second)) if first != second && !first.is_empty() && !second.is_empty() => {
             Ok([first.to_owned(), second.to_owned()])
         }
-        _ => Err("give the names of two cameras, such as left,right".to_owned()),
+        _ => Err("expected the names of two cameras, such as left,right".to_owned()),
     }
 }
 
 impl ViewArgs {
-    /// The map of a view.
+    /// Computes the pixel map of a view.
     fn map(&self, made: &Undistortion) -> PixelMap {
         match self.distance {
             Some(distance_mm) => made.clone().at_distance(distance_mm).map(),
@@ -133,12 +135,12 @@ impl ViewArgs {
             (u64::from(size[0]) * u64::from(size[1]), self.limits.limits().max_pixels);
         ensure!(
             pixels <= most,
-            "--size: {pixels} pixels are more than {most}: --max-pixels allows more"
+            "--size: {pixels} pixels exceed the limit of {most}; raise it with --max-pixels"
         );
         Ok(size)
     }
 
-    /// The files of a view beside its pictures.
+    /// Returns the files of a view other than its images.
     fn files(&self, stem: &str, file: &CameraFile, map: &PixelMap) -> anyhow::Result<Vec<File>> {
         let view = &file.camera;
         let mut files = vec![
@@ -155,7 +157,7 @@ impl ViewArgs {
     }
 }
 
-/// Makes a pinhole view of a camera, and pictures of it.
+/// Creates a pinhole view of a camera, and undistorts its images.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let file = camera_file::read_with_targets("--camera", &args.camera)?;
     let CameraFile { camera, calibrated_with, failed } = file;
@@ -177,14 +179,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     made.end(staged)
 }
 
-/// A view in a line.
+/// Describes a view in one line.
 fn told(view: &Camera, map: &PixelMap) -> String {
     let field = |side: u32| 2.0 * (f64::from(side) / 2.0 / view.focal_px.x).atan().to_degrees();
     let [x, y, width, height] = map.whole_rectangle();
     let whole = match map.covered() {
-        1.0 => "every pixel shows something".to_owned(),
+        1.0 => "every pixel is covered".to_owned(),
         part => format!(
-            "{:.1} % of it show something, all in {width} × {height} px from ({x}, {y})",
+            "{:.1} % of pixels are covered; {width} × {height} px from ({x}, {y}) are fully covered",
             100.0 * part
         ),
     };
@@ -198,12 +200,12 @@ fn told(view: &Camera, map: &PixelMap) -> String {
     )
 }
 
-/// Pictures to be made from a camera's.
+/// Output images of a camera.
 struct Pictures<'a> {
     args: &'a ViewArgs,
     folder: &'a Path,
     camera: &'a Camera,
-    /// What the name of a picture ends with.
+    /// Suffix of the image names.
     end: &'static str,
 }
 
@@ -212,7 +214,7 @@ impl Pictures<'_> {
         Ok(self.folder.join(format!("{}-{}.png", images::stem(image)?, self.end)))
     }
 
-    /// Refuses before the work what could not be written after it.
+    /// Rejects outputs that could not be written, before the work starts.
     fn check(&self, images: &Images) -> anyhow::Result<()> {
         output::check_folder(self.folder).context("-o")?;
         let mut stems = Stems::default();
@@ -222,7 +224,7 @@ impl Pictures<'_> {
         })
     }
 
-    /// Writes all; a picture that cannot be read is reported, and the others go on.
+    /// Writes all images. Reports images that cannot be read, and continues with the others.
     fn write(&self, images: &Images, map: &PixelMap) -> anyhow::Result<Made> {
         let is_new = !self.folder.exists();
         if images.count() != Some(0) {
@@ -251,9 +253,9 @@ impl Pictures<'_> {
         let done = done.into_inner().expect("no thread panics here");
         let failed = failed.into_inner().expect("no thread panics here").len();
         if done > 0 {
-            say!("wrote {} to {}", counted(done, "picture"), self.folder.display());
+            say!("wrote {} to {}", counted(done, "image"), self.folder.display());
         } else if is_new {
-            // This removes only an empty folder.
+            // Removes the folder only if it is empty.
             let _ = fs::remove_dir(self.folder);
         }
         Ok(Made { done, failed })
@@ -264,7 +266,7 @@ impl Pictures<'_> {
         let size = [picture.width(), picture.height()];
         ensure!(
             size == [self.camera.width, self.camera.height],
-            "{}: {} × {} px, the camera has {} × {}: it is another camera's, or of another mode",
+            "{}: {} × {} px, but the camera has {} × {}: the image is from another camera or mode",
             image.display(),
             size[0],
             size[1],
@@ -283,7 +285,7 @@ impl Pictures<'_> {
     }
 }
 
-/// How many pictures were made, and how many were not.
+/// Number of images written, and number that failed.
 #[derive(Clone, Copy)]
 struct Made {
     done: usize,
@@ -291,7 +293,7 @@ struct Made {
 }
 
 impl Made {
-    /// Writes the files beside the pictures, unless there should be pictures and none could be made.
+    /// Writes the other files, unless all images failed.
     fn end(self, staged: Staged) -> anyhow::Result<ExitCode> {
         let Self { done, failed } = self;
         let is_left = interrupt::is_raised();
@@ -306,25 +308,25 @@ impl Made {
             say!("wrote {}", path.display());
         }
         if is_left {
-            return Err(Interrupted(format!("{done} pictures are written")).into());
+            return Err(Interrupted(format!("{done} images were written")).into());
         }
         Ok(if failed > 0 { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })
     }
 }
 
-/// Makes rectified views of two cameras of a rig, and pictures of them.
+/// Creates rectified views of two cameras of a rig, and rectifies their images.
 pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
     let (found, failed) = read_rig(&args.rig)?;
     let Estimate { cameras, calibrated_with, .. } = found;
     let named = |name: &String| {
         cameras.iter().find(|camera| camera.name == *name).ok_or_else(|| {
             let names: Vec<&str> = cameras.iter().map(|camera| camera.name.as_str()).collect();
-            anyhow!("--pair: there is no camera {name}: the rig has {}", names.join(", "))
+            anyhow!("--pair: unknown camera {name} (the rig has {})", names.join(", "))
         })
     };
     let [first, second] = [named(&args.pair[0])?, named(&args.pair[1])?];
     let names = [first.name.as_str(), second.name.as_str()];
-    // A camera that was given to the rig was calibrated elsewhere.
+    // A known camera was calibrated before the rig.
     let calibrated_with = [first, second].map(|camera| match camera.model {
         Some(_) => calibrated_with.clone(),
         None => Vec::new(),
@@ -362,7 +364,7 @@ pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
         true => (baseline.x, "row"),
         false => (baseline.y, "column"),
     };
-    say!("baseline {mm:.3} mm; a point is in the same {what} of both pictures");
+    say!("baseline {mm:.3} mm; a point is in the same {what} of both images");
     let staged = Staged::new(&args.view.output, &files, args.view.overwrite)?;
     let mut made = Made { done: 0, failed: 0 };
     for (index, images) in images.iter().enumerate() {
@@ -372,12 +374,15 @@ pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
     made.end(staged)
 }
 
-/// The rig of a file, and why its calibration failed.
+/// Reads the rig of a file, and why its calibration failed, if it did.
 fn read_rig(path: &Path) -> anyhow::Result<(Estimate, Option<String>)> {
     let text = Limits::default().read_text(path)?;
     let found = saved::read_without_target(&text).with_context(|| path.display().to_string())?;
     if found.cameras.len() < 2 {
-        bail!("{}: a single camera: give the rig.json of `deltille rig`", path.display());
+        bail!(
+            "{}: this file contains a single camera; use the rig.json of `deltille rig`",
+            path.display()
+        );
     }
     Ok((found, camera_file::warn_if_failed(path, &text)))
 }

@@ -25,26 +25,26 @@ use deltille_core::words::{counted, p_value, shown};
 /// Arguments of `deltille compare`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A calibration: the .json of `deltille calibrate` or `rig`; or a camera file, of which no uncertainty is known
+    /// A calibration (the .json of `deltille calibrate` or `rig`), or a camera file, whose uncertainty is unknown
     #[arg(value_name = "FIRST")]
     first: PathBuf,
-    /// Another one of the same camera or rig
+    /// Another calibration of the same camera or rig
     #[arg(value_name = "SECOND")]
     second: PathBuf,
-    /// Distance of the points by which cameras are compared, such as 2m [default: infinity]
+    /// Distance of the points at which cameras are compared, such as 2m [default: infinity]
     #[arg(long, value_name = "LENGTH", value_parser = distance)]
     distance: Option<f64>,
-    /// Part of the image that is compared: seen, where both saw corners; image, all of it; or the pixels
+    /// Image region to compare: seen (where both calibrations have corners), image (the whole image), or pixels
     /// LEFT,TOP,RIGHT,BOTTOM
     #[arg(long, value_name = "PART", default_value = "seen", value_parser = region)]
     region: Region,
-    /// Differences up to this, px rms a coordinate, are no reason to end with exit code 1, however significant
+    /// Differences up to this RMS per axis in px do not cause exit code 1, even if significant
     #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = tolerance)]
     tolerance: f64,
-    /// Write the comparison, and a picture of the same name of each camera
+    /// Write the comparison, and a plot of each camera under the same name
     #[arg(short, long, value_name = "FILE.json")]
     output: Option<PathBuf>,
-    /// Compare even where both were calibrated with boards of the same tags at different sizes
+    /// Compare even if the calibrations used boards of the same tags at different sizes
     #[arg(long)]
     assume_target: bool,
     #[command(flatten)]
@@ -59,17 +59,17 @@ fn region(text: &str) -> Result<Region, String> {
         (_, Some(&[left, top, right, bottom])) if left < right && top < bottom => {
             Ok(Region::Within(DVec2::new(left, top), DVec2::new(right, bottom)))
         }
-        _ => Err("give seen, image, or four pixels LEFT,TOP,RIGHT,BOTTOM".to_owned()),
+        _ => Err("expected seen, image, or four pixels LEFT,TOP,RIGHT,BOTTOM".to_owned()),
     }
 }
 
 fn tolerance(text: &str) -> Result<f64, String> {
     let px = text.strip_suffix("px").unwrap_or(text).trim().parse::<f64>().ok();
-    px.filter(|px| (0.0..=1e6).contains(px)).ok_or("give px, such as 0.05".to_owned())
+    px.filter(|px| (0.0..=1e6).contains(px)).ok_or("expected px, such as 0.05".to_owned())
 }
 
-/// Compares two calibrations; exit code 1 where they differ by more than their uncertainties explain, and by more than
-/// is tolerated, 3 where uncertainties are missing.
+/// Compares two calibrations. The exit code is 1 if they differ by more than their uncertainties and the tolerance
+/// explain, and 3 if uncertainties are missing.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let path = args.output.as_deref().map(|path| output::file(path, "comparison", "json"));
     let path = path.transpose()?;
@@ -80,7 +80,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             .is_err()
     {
         tell!(
-            "note: --assume-target: {one} and {other} were made with different boards, compared as they are"
+            "note: --assume-target: {one} and {other} were calibrated with different boards; comparing them unchanged"
         );
     }
     compare_boards([&one, &other], [&mut first, &mut second], args.assume_target)
@@ -107,13 +107,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         // Writing to a String cannot fail.
         let _ = writeln!(
             text,
-            "{} seen from {}: turned by {:.4}° and moved by {:.3} mm: {}",
+            "{} relative to {}: rotated by {:.4}°, translated by {:.3} mm: {}",
             shown(&motion.to),
             shown(&motion.from),
             motion.turn_rad.length().to_degrees(),
             motion.moved_mm.length(),
             match motion.why_undecided() {
-                Some(why) => format!("cannot judge whether it has moved: {why}"),
+                Some(why) => format!("cannot determine whether it has moved: {why}"),
                 None => verdict(motion.chance, motion.is_significant(), "it has moved"),
             }
         );
@@ -134,7 +134,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     })
 }
 
-/// A calibration or rig, or the camera of a camera file.
+/// Reads a calibration or rig, or the camera of a camera file.
 fn read(option: &'static str, path: &Path) -> anyhow::Result<Estimate> {
     let is_json = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("json"));
     if !is_json {
@@ -147,14 +147,14 @@ fn read(option: &'static str, path: &Path) -> anyhow::Result<Estimate> {
     let text = Limits::default().read_text(path).context(option)?;
     let found = saved::read_without_target(&text);
     let mut found = found.with_context(|| format!("{option}: {}", path.display()))?;
-    // A calibration that failed has deviations of anything.
+    // The uncertainties of a failed calibration are meaningless.
     if camera_file::warn_if_failed(path, &text).is_some() {
         found.cameras.iter_mut().for_each(CameraEstimate::forget_uncertainties);
     }
     Ok(found)
 }
 
-/// The same cameras of both.
+/// Pairs the cameras that both calibrations contain.
 fn pairs<'a>(
     [first_path, second_path]: [&str; 2],
     [first, second]: [&'a [CameraEstimate]; 2],
@@ -167,12 +167,12 @@ fn pairs<'a>(
     };
     let pairs: Vec<_> = first.iter().filter_map(same).collect();
     let names = |of: &[CameraEstimate]| match of {
-        [only] if only.name.is_empty() => "a camera without a name".to_owned(),
+        [only] if only.name.is_empty() => "an unnamed camera".to_owned(),
         all => all.iter().map(|camera| shown(&camera.name)).collect::<Vec<_>>().join(", "),
     };
     ensure!(
         !pairs.is_empty(),
-        "no camera is in both: {first_path} has {}, {second_path} has {}: give two calibrations of the same rig, or two \
+        "no camera is in both: {first_path} has {}, {second_path} has {}; compare two calibrations of the same rig or \
          of the same camera",
         names(first),
         names(second)
@@ -180,7 +180,7 @@ fn pairs<'a>(
     Ok(pairs)
 }
 
-/// The comparison, and a picture of each camera that was compared.
+/// Returns the comparison, and a plot of each compared camera.
 fn files(
     path: &Path,
     pairs: &[(&CameraEstimate, &CameraEstimate)],
@@ -195,7 +195,7 @@ fn files(
             name => format!("{stem}-{name}.svg"),
         };
         let size_px = [camera.camera.width, camera.camera.height];
-        // Before the work, a picture of nothing.
+        // An empty plot serves for the checks before the work.
         let nothing = Comparison::default();
         let found = found.get(index).unwrap_or(&nothing);
         files.push(text_file(name, comparison_svg(size_px, found)));
@@ -203,7 +203,7 @@ fn files(
     files
 }
 
-/// How two cameras differ, in words.
+/// Describes how two cameras differ.
 fn told(camera: &CameraEstimate, found: &Comparison, tolerance: f64) -> String {
     let name = match camera.name.as_str() {
         "" => String::new(),
@@ -212,40 +212,40 @@ fn told(camera: &CameraEstimate, found: &Comparison, tolerance: f64) -> String {
     let far = found.distance_mm.map_or("infinity".to_owned(), |mm| format!("{mm:.0} mm"));
     let [turn, moved] = found.second_from_first.off(&Pose::IDENTITY);
     let moved = match found.distance_mm {
-        Some(_) => format!(" and moved by {:.3} mm", moved.length()),
+        Some(_) => format!(" and translated by {:.3} mm", moved.length()),
         None => String::new(),
     };
     let meaning = match found.rms_px <= tolerance {
         true => format!("within the tolerance of {tolerance} px"),
         false => {
-            "the camera has changed, or its model or the board does not hold in both".to_owned()
+            "the camera has changed, or its model or the board does not fit in both".to_owned()
         }
     };
     let verdict_of = |found: &Comparison| Verdict::of(std::slice::from_ref(found), &[], tolerance);
     let expected = match (found.expected_px, found.why_undecided()) {
         (Some(px), _) => format!(
-            "{name}from the uncertainties of both {px:.4} px are expected: {}\n",
+            "{name}expected from both uncertainties: {px:.4} px: {}\n",
             verdict(found.chance, found.is_significant(), &meaning)
         ),
         (None, _) if verdict_of(found) == Verdict::Same && tolerance > 0.0 => {
             format!("{name}{meaning}\n")
         }
-        (None, _) if verdict_of(found) == Verdict::Same => format!("{name}both are the same\n"),
+        (None, _) if verdict_of(found) == Verdict::Same => format!("{name}both are identical\n"),
         (None, why) => {
             let advice = match found.lacks_uncertainty {
-                [false, false] => "give a larger --region",
+                [false, false] => "use a larger --region",
                 _ => {
-                    "give the .json of `deltille calibrate` or `rig`, which has them unless the camera was kept fixed or the calibration failed"
+                    "use the .json of `deltille calibrate` or `rig`, which contains them unless the camera was fixed or the calibration failed"
                 }
             };
             format!(
-                "{name}cannot judge whether the camera has changed: {}; {advice}, or --tolerance\n",
+                "{name}cannot determine whether the camera has changed: {}; {advice}, or set --tolerance\n",
                 why.unwrap_or_default()
             )
         }
     };
     format!(
-        "{name}differs by {:.4} px (rms a coordinate), at most {:.4} px, over {} at {far}, after it is turned by \
+        "{name}difference {:.4} px (RMS per axis), at most {:.4} px, over {} at {far}, after a rotation by \
          {:.4}°{moved}\n{expected}",
         found.rms_px,
         found.largest_px(),
@@ -254,13 +254,13 @@ fn told(camera: &CameraEstimate, found: &Comparison, tolerance: f64) -> String {
     )
 }
 
-/// Whether chance makes as much.
+/// States whether a difference is significant.
 fn verdict(chance: Option<f64>, is_significant: Option<bool>, changed: &str) -> String {
     match (chance, is_significant) {
         (Some(chance), Some(true)) => {
-            format!("more than chance makes ({}): {changed}", p_value(chance))
+            format!("significant ({}): {changed}", p_value(chance))
         }
-        (Some(chance), _) => format!("no more than chance makes ({})", p_value(chance)),
+        (Some(chance), _) => format!("not significant ({})", p_value(chance)),
         (None, _) => String::new(),
     }
 }

@@ -32,60 +32,58 @@ use deltille::raster::AnyGray;
 use deltille::targets::Target;
 use deltille_core::words::{counted, shown};
 
-/// How long the folder is left alone between two looks.
+/// Interval between two passes over the folder.
 const PAUSE: Duration = Duration::from_millis(400);
 
-/// A photograph that cannot be read is given up when it has not changed for so long: programs that write one pause
-/// less, and nobody waits longer for an answer.
+/// Time without changes after which an unreadable photograph is given up. Programs that are still writing one pause
+/// for less, and a user would not wait longer.
 const GIVEN_UP: Duration = Duration::from_secs(3);
 
 /// Arguments of `deltille guide`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Folder that another program, such as a camera's, fills with photographs
+    /// Folder in which another program, such as a camera's, saves photographs
     folder: PathBuf,
-    /// Description of the target: the .json that was written with it, or a .dsc
+    /// Target description: the .json written with the target, or a .dsc
     #[arg(long, required_unless_present = "grid", value_name = "FILE")]
     target: Option<PathBuf>,
     #[command(flatten)]
     grid: GridArgs,
-    /// What of the camera is to be found: radtan, radtan5, rational, thin-prism, kannala-brandt …, as for
-    /// `deltille calibrate`
+    /// Camera model to calibrate: radtan, radtan5, rational, thin-prism, kannala-brandt …, as in `deltille calibrate`
     #[arg(long, default_value = "radtan", conflicts_with = "camera")]
     model: ModelChoice,
-    /// The camera as it is nearly, to begin with: its file; all its parameters are found anew
+    /// Approximate camera file to start from; all its parameters are calibrated again
     #[arg(long, value_name = "FILE")]
     camera: Option<PathBuf>,
-    /// Find how the sheet of the board is bent, too, so that views are chosen for that as well
+    /// Also estimate how the board is bent, and choose views for that
     #[arg(long, conflicts_with = "shape")]
     board_shape: bool,
-    /// Nearest distance at which the board can be held and is in focus, such as 30cm [default: half the
-    /// board's diagonal]
+    /// Nearest distance at which the board can be held in focus, such as 30cm [default: half the board's diagonal]
     #[arg(long, value_name = "LENGTH", value_parser = distance)]
     nearest: Option<f64>,
-    /// Farthest distance, such as 2m [default: none]
+    /// Farthest distance, such as 2m [default: unlimited]
     #[arg(long, value_name = "LENGTH", value_parser = distance)]
     farthest: Option<f64>,
-    /// End when projections are as sure as this over the whole image, px [default: when the next view would lower
-    /// the uncertainty by less than 3 %]
+    /// Stop at this projection uncertainty over the whole image, px [default: when the next view would lower the
+    /// uncertainty by less than 3 %]
     #[arg(long, value_name = "PX", value_parser = px)]
     until: Option<f64>,
-    /// Look at the folder once, and end
+    /// Read the folder once and exit
     #[arg(long)]
     once: bool,
-    /// Write the next view as JSON: pose, outline and corners in px, figures; again after every photograph
+    /// Write the next view as JSON after every photograph: pose, outline and corners in px, and statistics
     #[arg(short, long, value_name = "FILE.json")]
     output: Option<PathBuf>,
-    /// Draw the outline in which to hold the board: an .svg to lay over a live picture, or a .png over the last
+    /// Draw the outline in which to hold the board: an .svg to overlay on a live image, or a .png over the last
     /// photograph
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// Use --target even where the camera was calibrated with a board of the same tags at another size
+    /// Use --target even if the camera was calibrated with a board of the same tags at another size
     #[arg(long)]
     assume_target: bool,
     #[command(flatten)]
     sheet: SheetArgs,
-    /// Family file, where the target names a family that is not shipped
+    /// Family file, if the target uses a family that does not ship with the program
     #[arg(long)]
     family: Option<String>,
     #[command(flatten)]
@@ -94,31 +92,31 @@ pub struct Args {
     overwrite: Overwrite,
 }
 
-/// An uncertainty in px.
+/// Parses an uncertainty in px.
 fn px(text: &str) -> Result<f64, String> {
     let px: Option<f64> = text.parse().ok().filter(|px: &f64| px.is_finite() && *px > 0.0);
-    px.ok_or_else(|| "write pixels, more than 0, such as 0.05".to_owned())
+    px.ok_or_else(|| "expected px greater than 0, such as 0.05".to_owned())
 }
 
-/// Proposes one view after the other until they are enough.
+/// Proposes views one after the other until they suffice.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
     let mut printing: Printing = match (&args.target, args.grid.read_target()?) {
         (Some(path), _) => target_file::read_placed(path, &limits).context("--target")?,
         (None, Some((_, target))) => target.into(),
-        (None, None) => bail!("give --target FILE, or --grid for an untagged board"),
+        (None, None) => bail!("--target FILE is needed, or --grid for an untagged board"),
     };
     target_file::set_family(&mut printing.target, args.family.as_deref())?;
     let target = &printing.target;
     ensure!(
         args.folder.is_dir(),
-        "{}: is no folder: name the one that fills",
+        "{} is not a folder; expected the folder in which photographs are saved",
         args.folder.display()
     );
     let reference = Reference::Target(target);
     ensure!(
         !reference.is_loose(),
-        "--target: {} are boards that lie about: give the file of one of them",
+        "--target: {} contains several loose boards; use the file of one of them",
         counted(target.panels.len(), "panel")
     );
     let sheet = args.sheet.read(&limits, &[target.identity()], std::slice::from_ref(&printing))?;
@@ -136,11 +134,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let board_shape = args.board_shape;
     ensure!(
         !board_shape || target.panels.len() == 1,
-        "--board-shape: is of a single board, and the target has {}",
+        "--board-shape supports a single board, but the target has {}",
         counted(target.panels.len(), "panel")
     );
     let places = args.places()?;
-    interrupt::stands("what was written last is whole");
+    interrupt::stands("the files written last are complete");
     let session = Watch {
         guide: match size {
             Some(size) => Some(args.guide(target, size, &intrinsics)?),
@@ -161,7 +159,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 impl Args {
-    /// What is known of the camera, and the size of its pictures where that is.
+    /// Returns the intrinsics to calibrate, and the image size if known.
     fn intrinsics(&self, near: Option<Camera>) -> anyhow::Result<(Intrinsics, Option<[u32; 2]>)> {
         if let Some(camera) = near {
             ensure!(!matches!(camera.lens, Lens::Spline(_)), "--camera: {NO_SPLINE}");
@@ -171,8 +169,8 @@ impl Args {
         }
         match self.model {
             ModelChoice::Auto => bail!(
-                "--model: auto chooses when the pictures are there: take them by the richest one that may be chosen, \
-                 such as rational"
+                "--model: auto needs the finished set of images; take them with the richest model in question, such as \
+                 rational"
             ),
             ModelChoice::Model(Model::Spline { .. }) => bail!("--model: {NO_SPLINE}"),
             ModelChoice::Model(model) => Ok((model.into(), None)),
@@ -186,12 +184,11 @@ impl Args {
         intrinsics: &Intrinsics,
     ) -> anyhow::Result<Guide> {
         let guide = Guide::new(target, size, intrinsics.clone());
-        let guide = guide.context("--target: it has no corners: name a board or a solid")?;
+        let guide = guide.context("--target has no corners; use a board or a solid")?;
         Ok(guide.within_mm(self.nearest, self.farthest))
     }
 
-    /// Where the next view is written, as it was asked for. What would be refused is refused before the first
-    /// photograph.
+    /// Returns the paths of the next view. Rejects unusable paths before the first photograph.
     fn places(&self) -> anyhow::Result<Places> {
         let json = self.output.as_deref().map(|path| output::file(path, "next", "json"));
         let json = json.transpose().context("-o")?;
@@ -207,7 +204,7 @@ impl Args {
             let is_watched = folder.canonicalize().ok() == self.folder.canonicalize().ok();
             ensure!(
                 !(is_png && is_watched),
-                "--picture: {} would be taken for a photograph: name a file in another folder",
+                "--picture: {} would be read as a photograph; use another folder",
                 path.display()
             );
             output::check_writable("--picture", path)?;
@@ -223,21 +220,21 @@ impl Args {
     }
 }
 
-/// Why a spline is not guided.
-const NO_SPLINE: &str = "a spline needs corners everywhere: take the pictures by kannala-brandt or radtan5, and \
-                         calibrate the same pictures by spline";
+/// Why splines are not supported.
+const NO_SPLINE: &str = "a spline needs corners everywhere: take the images with kannala-brandt or radtan5, then \
+                         calibrate them with spline";
 
 fn name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Files of the next view.
+/// Output files of the next view.
 struct Places {
     json: Option<PathBuf>,
     picture: Option<PathBuf>,
 }
 
-/// A file as it was when it was looked at.
+/// State of a file when it was last read.
 #[derive(Clone, Copy, PartialEq)]
 struct Stamp {
     bytes: u64,
@@ -247,21 +244,21 @@ struct Stamp {
 /// A photograph in the folder.
 struct Picture {
     stamp: Stamp,
-    /// When it was found to be as it is.
+    /// When this state was first seen.
     since: SystemTime,
-    /// What came of it; `None` as long as it cannot be read, or may still grow.
+    /// Result of the photograph; `None` while it cannot be read, or may still grow.
     seen: Option<Seen>,
 }
 
-/// What a photograph showed.
+/// Content of a photograph.
 enum Seen {
-    /// Nothing that can be used, as was told.
+    /// Nothing usable; already reported.
     Nothing,
     /// The target.
     Target(Box<Detection>),
 }
 
-/// A folder that is watched, and what is known from it.
+/// A watched folder, and the results from it.
 struct Watch<'a> {
     args: Args,
     target: &'a Target,
@@ -271,10 +268,10 @@ struct Watch<'a> {
     intrinsics: Intrinsics,
     limits: Limits,
     places: Places,
-    /// From the first photograph on, of the size that most have.
+    /// Set with the first photograph, for the most frequent image size.
     guide: Option<Guide>,
     pictures: BTreeMap<PathBuf, Picture>,
-    /// What was told of views that take no part, as long as they do not.
+    /// Reported reasons of excluded views, while they remain excluded.
     told: BTreeSet<String>,
 }
 
@@ -284,7 +281,7 @@ impl Watch<'_> {
         loop {
             let (changed, last) = self.look()?;
             let waits = self.pictures.values().any(|picture| picture.seen.is_none());
-            // A view that may still come is waited for, before others are asked for.
+            // Waits for pending photographs before proposing a view.
             if (changed || is_first) && !(self.args.once && waits) {
                 is_first = false;
                 if self.propose(last.as_ref())? {
@@ -306,10 +303,10 @@ impl Watch<'_> {
             return Ok(());
         }
         let views = counted(self.detections().count(), "view");
-        Err(Interrupted(format!("{views} so far; start again to go on with them")).into())
+        Err(Interrupted(format!("{views} so far; run the command again to continue")).into())
     }
 
-    /// Looks at what is new in the folder; whether that changes anything, and the photograph that was looked at last.
+    /// Reads new files in the folder. Returns whether anything changed, and the last photograph read.
     fn look(&mut self) -> anyhow::Result<(bool, Option<AnyGray>)> {
         let there = photographs_in(&self.args.folder)?;
         let before = self.pictures.len();
@@ -318,7 +315,7 @@ impl Watch<'_> {
         let mut last = None;
         for path in there {
             self.check_interrupt()?;
-            // Whatever was taken away meanwhile comes back or does not.
+            // A file that disappeared meanwhile may come back.
             let Ok(about) = path.metadata() else { continue };
             let stamp = Stamp { bytes: about.len(), changed: about.modified().ok() };
             let now = SystemTime::now();
@@ -334,7 +331,7 @@ impl Watch<'_> {
         Ok((changed, last))
     }
 
-    /// What a photograph shows; `None` where it cannot be read yet.
+    /// Detects the target in a photograph; `None` if it cannot be read yet.
     fn read(
         &self,
         path: &Path,
@@ -359,7 +356,7 @@ impl Watch<'_> {
         let corners: usize = labelled.map(|grid| grid.corners.len()).sum();
         if corners == 0 {
             let why = found.reasons.first().map_or(String::new(), |why| format!(": {why}"));
-            tell!("{show}: no board{why}");
+            tell!("{show}: no board found{why}");
             return Ok(Some(Seen::Nothing));
         }
         say!("{show}: {}", counted(corners, "corner"));
@@ -367,7 +364,7 @@ impl Watch<'_> {
         Ok(Some(Seen::Target(Box::new(found))))
     }
 
-    /// Photographs that show the target, with what they show.
+    /// Iterates over the photographs that show the target, with their detections.
     fn detections(&self) -> impl Iterator<Item = (&Path, &Detection)> {
         self.pictures.iter().filter_map(|(path, picture)| match &picture.seen {
             Some(Seen::Target(found)) => Some((path.as_path(), found.as_ref())),
@@ -375,7 +372,7 @@ impl Watch<'_> {
         })
     }
 
-    /// The views of the photographs that have the guide's size, and why others take no part.
+    /// Returns the views with the guide's image size, and the reasons why others are excluded.
     fn views(&self, size_px: [u32; 2]) -> anyhow::Result<(Vec<View>, Vec<String>)> {
         let [width, height] = size_px;
         let (ours, others): (Vec<_>, Vec<_>) =
@@ -384,7 +381,7 @@ impl Watch<'_> {
             .into_iter()
             .map(|(path, found)| {
                 let (path, w, h) = (name(path), found.width, found.height);
-                format!("{path}: left out: it has {w} × {h} pixels, most have {width} × {height}")
+                format!("{path}: excluded: it has {w} × {h} pixels, but most images have {width} × {height}")
             })
             .collect();
         let named = ours.into_iter().map(|(path, found)| {
@@ -403,7 +400,8 @@ impl Watch<'_> {
         Ok((shown.views, out))
     }
 
-    /// The guide for the size that most photographs have, of two the one that comes first; none before there is one.
+    /// Returns the guide for the most frequent image size (in a tie, the first one seen), or `None` before the first
+    /// photograph.
     fn sized(&mut self) -> anyhow::Result<Option<&Guide>> {
         if self.args.camera.is_none() {
             let sizes: Vec<[u32; 2]> =
@@ -419,12 +417,12 @@ impl Watch<'_> {
         Ok(self.guide.as_ref())
     }
 
-    /// Tells and writes the next view; whether no more are needed.
+    /// Prints and writes the next view. Returns whether no more views are needed.
     fn propose(&mut self, last: Option<&AnyGray>) -> anyhow::Result<bool> {
         let Some(guide) = self.sized()?.cloned() else {
             say!(
-                "next: hold the board in the middle of the picture, facing the camera, so that it fills two thirds; \
-                 the size of the first photograph tells the rest"
+                "next: hold the board in the middle of the image, facing the camera, so that it fills two thirds; \
+                 the first photograph determines the image size"
             );
             return Ok(false);
         };
@@ -442,18 +440,20 @@ impl Watch<'_> {
         let views = counted(count, "view");
         match (&estimate, next.now_px) {
             (Ok(_), Some(now)) => {
-                say!("{views}: projections are known to {now:.4} px over the image")
+                say!("{views}: projection uncertainty (1σ) {now:.4} px over the image")
             }
-            (Err(error), _) if count >= ENOUGH_TO_TELL => say!("{views}: no camera yet: {error}"),
-            _ => say!("{views}: no camera yet"),
+            (Err(error), _) if count >= ENOUGH_TO_TELL => {
+                say!("{views}: not calibrated yet: {error}")
+            }
+            _ => say!("{views}: not calibrated yet"),
         }
         self.write(&next, count, is_enough, last)?;
         if is_enough {
             let folder = shown(&self.args.folder.display().to_string()).into_owned();
-            say!("enough: calibrate the photographs of {folder}");
+            say!("done: calibrate with the photographs in {folder}");
             if count < FEW {
                 tell!(
-                    "{views} are few: what is known to {} px is so if the model fits, which shows in more",
+                    "{views} are few: the uncertainty of {} px assumes that the model fits, which only more views can show",
                     next.now_px.map_or(String::new(), |now| format!("{now:.4}"))
                 );
             }
@@ -465,7 +465,7 @@ impl Watch<'_> {
         Ok(false)
     }
 
-    /// Tells why views take no part, each as long as it takes none once.
+    /// Prints why views are excluded, once for as long as they remain excluded.
     fn tell_once(&mut self, out: Vec<String>) {
         for line in out.iter().filter(|line| !self.told.contains(*line)) {
             tell!("{line}");
@@ -473,7 +473,7 @@ impl Watch<'_> {
         self.told = out.into_iter().collect();
     }
 
-    /// Writes the files that were asked for, each beside its place and renamed.
+    /// Writes the requested files, each to a temporary path that is then renamed.
     fn write(
         &self,
         next: &NextView,
@@ -497,13 +497,13 @@ impl Watch<'_> {
     }
 }
 
-/// From so many views on it is said why there is no camera: before, there are too few.
+/// Number of views from which a failed calibration is explained; fewer are too few anyway.
 const ENOUGH_TO_TELL: usize = 3;
 
-/// Fewer views than these hardly tell a model that does not fit from one that does: each has six coordinates of its
-/// own, and a wrong model shows in what views disagree about.
+/// Fewer views than these hardly reveal an unsuitable model: each view has six pose parameters of its own, and a
+/// wrong model shows in inconsistencies between views.
 const FEW: usize = 8;
 
 fn told(left_out: &Excluded) -> String {
-    format!("{}: left out: {}", left_out.view, left_out.reason)
+    format!("{}: excluded: {}", left_out.view, left_out.reason)
 }

@@ -1,14 +1,14 @@
-//! Calibrations: from detections to cameras, rigs and measured targets.
+//! Calibration: from detections to cameras, rigs and measured targets.
 //!
-//! Comes in: detections of `see`, or photographs for `guide`. Goes out: cameras for other programs, the result as a file
-//! and as a page, and what is wrong with it. A command meets the files in this order:
+//! Input: detections from `see`, or photographs for `guide`. Output: camera files for other programs, the result as a
+//! file and as a report, and diagnoses. The modules, in the order in which a command uses them:
 //!
-//! 1. `guide` says which photograph to take next.
-//! 2. `one_camera` is `deltille calibrate`, `rig` is `deltille rig`: their options, and their files.
-//! 3. `sightings` reads what both calibrate from: detections, the target or the untagged board, how it was printed.
-//! 4. `solving` calls the library with a model that is given or chosen, and says how sure the result is.
-//! 5. `report_page` is the page about it, with the photographs that it shows.
-//! 6. `compare` says whether two results differ by more than chance.
+//! 1. `guide` proposes the next photograph to take.
+//! 2. `one_camera` is `deltille calibrate`, and `rig` is `deltille rig`: their options and files.
+//! 3. `sightings` reads the common input: detections, the target or untagged board, and how it was printed.
+//! 4. `solving` calls the library with a given or selected model, and prints the uncertainty of the result.
+//! 5. `report_page` writes the report, with the photographs that it shows.
+//! 6. `compare` tests whether two results differ significantly.
 
 pub mod compare;
 pub mod guide;

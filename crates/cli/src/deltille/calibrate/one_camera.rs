@@ -27,7 +27,7 @@ use deltille::export::{CAMERA_FORMATS, CameraFormat, Written, calibration, saved
 use deltille::targets::TargetIdentity;
 use deltille_core::words::{counted, places, shown};
 
-/// Correlations from here on are reported: such parameters can hardly be separated.
+/// Correlations from this value on are reported: such parameters can hardly be separated.
 const STRONG_CORRELATION: f64 = 0.98;
 
 /// Arguments of `deltille calibrate`.
@@ -35,42 +35,42 @@ const STRONG_CORRELATION: f64 = 0.98;
 pub struct Args {
     #[command(flatten)]
     sightings: SightingsArgs,
-    /// The model.
+    /// The camera model.
     #[arg(long, required_unless_present = "fixed_intrinsics", help = format!(
-        "What is to be found beside fx, fy, cx, cy: {}, whose fx, fy, cx, cy are kept; auto takes the one that holds \
-         views best that took no part in finding it",
+        "Camera model, beside fx, fy, cx, cy: {}, which fixes fx, fy, cx, cy; auto selects the model with the lowest \
+         error on held-out views",
         Model::choice()
     ))]
     model: Option<ModelChoice>,
-    /// Find only the poses of this camera: its file, as written by this command, ROS or OpenCV
+    /// Estimate only poses, with this fixed camera: a file written by this command, ROS or OpenCV
     #[arg(long, value_name = "CAMERA", conflicts_with_all = ["model", "holdout", "board_shape"])]
     fixed_intrinsics: Option<PathBuf>,
     #[command(flatten)]
     solve: SolveArgs,
-    /// What to write; several may be given, separated by commas
+    /// Output formats, separated by commas
     #[arg(long, value_delimiter = ',', default_value = "own", value_parser = format(CAMERA_FORMATS))]
     format: Vec<&'static CameraFormat>,
-    /// Folder of the photographs, for small pictures on the page
+    /// Folder of the photographs, for thumbnails in the report
     #[arg(long, value_name = "FOLDER", requires = "report")]
     images: Option<PathBuf>,
-    /// The camera file, .yaml, or a folder for camera.yaml; other files are written beside it and
-    /// named after it [default: camera.yaml, or poses.yaml with --fixed-intrinsics]
+    /// Camera file (.yaml), or a folder for camera.yaml; other files are written beside it with the same stem
+    /// [default: camera.yaml, or poses.yaml with --fixed-intrinsics]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     #[command(flatten)]
     overwrite: Overwrite,
 }
 
-/// Calibrates, writes the camera, and tells how good it is.
+/// Calibrates, writes the camera, and prints its quality.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    // Poses of a known camera do not take the place of its calibration.
+    // Poses with a fixed camera must not replace its calibration.
     let stem = if args.fixed_intrinsics.is_some() { "poses" } else { "camera" };
     let path = output::file(args.output.as_deref().unwrap_or(Path::new(".")), stem, "yaml")?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     if let Some(known) = &args.fixed_intrinsics {
         ensure!(
             !same_file(&path, known),
-            "-o: {} is the camera of --fixed-intrinsics, whose uncertainties would be lost: give another name",
+            "-o: {} is the camera of --fixed-intrinsics, and its uncertainties would be lost; use another name",
             path.display()
         );
     }
@@ -93,7 +93,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         camera_file::check_or_note(known, &known_with, targets, is_assumed)?;
     }
     for picture in &empty {
-        tell!("{}: no board, left out", picture.display());
+        tell!("{}: excluded: no board found", picture.display());
     }
     if let Some(folder) = &args.images {
         check_images(folder, &views)?;
@@ -106,10 +106,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let listed = chosen(&tried);
     let mut solved = args.solve.solve(calibration, print, vec![tried])?;
     unnamed.iter().for_each(|note| tell!("{note}"));
-    ensure!(!solved.estimate.frames.is_empty(), "no view shows the target as this camera sees it");
+    ensure!(!solved.estimate.frames.is_empty(), "no view is consistent with this camera");
     let of_test = solved.estimate.held_out.iter().flat_map(|test| &test.excluded);
     for out in solved.estimate.excluded.iter().chain(of_test) {
-        tell!("{}: left out: {}", out.view, out.reason);
+        tell!("{}: excluded: {}", out.view, out.reason);
     }
     solved.estimate.excluded.splice(0..0, left_out);
     if let Err(foreign) = solved.tell() {
@@ -152,17 +152,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 impl Args {
-    /// What is known of the camera, and the targets that it was calibrated with.
+    /// Returns the intrinsics, and the targets that the camera was calibrated with.
     fn intrinsics(&self) -> anyhow::Result<(Intrinsics, Vec<TargetIdentity>)> {
         if let Some(path) = &self.fixed_intrinsics {
             let known = camera_file::read_to_keep("--fixed-intrinsics", path)?;
             return Ok((Intrinsics::Known(known.camera), known.calibrated_with));
         }
         let sought = self.model.map(|model| Intrinsics::Unknown(model.richest()));
-        Ok((sought.context("give --model, or --fixed-intrinsics")?, Vec::new()))
+        Ok((sought.context("--model or --fixed-intrinsics is needed")?, Vec::new()))
     }
 
-    /// The files of a camera in all formats asked for, and why there are not all; `json` is the text that tells all.
+    /// Returns the camera in all requested formats, and errors for those that failed; `json` is the complete result.
     fn files(
         &self,
         stem: &str,
@@ -179,9 +179,9 @@ impl Args {
         };
         for format in &self.format {
             if file.failed.is_some() && !format.is_own() {
-                // No other program would read the reason.
+                // Other programs would ignore the reason.
                 tell!(
-                    "warning: --format {}: not written, as the calibration failed",
+                    "warning: --format {}: not written, because the calibration failed",
                     format.name()
                 );
                 continue;
@@ -198,7 +198,7 @@ impl Args {
     }
 }
 
-/// Parameters with their deviations, views with their errors.
+/// Formats the parameters with their standard deviations, and the views with their errors.
 fn table(estimate: &Estimate) -> String {
     estimate.cameras.iter().map(of_camera).collect::<String>() + &headline(estimate) + "\n"
 }
@@ -212,7 +212,7 @@ fn of_camera(camera: &CameraEstimate) -> String {
     };
     if camera.covariance_from(Source::Noise).is_some() && spline.is_none() {
         let observed = if is_observed { "    observed" } else { "" };
-        let _ = writeln!(text, "                        ± from noise{observed}");
+        let _ = writeln!(text, "                        σ from noise{observed}");
     }
     for (parameter, observed) in camera.parameters.iter().zip(camera.observed_sd()) {
         if spline.is_some() {
@@ -240,7 +240,7 @@ fn of_camera(camera: &CameraEstimate) -> String {
     if let Some(line) = sureness(camera) {
         let _ = writeln!(text, "{line}");
     }
-    // Of neighbouring knots nobody asks.
+    // Correlations of neighbouring knots are not of interest.
     let found: Vec<&str> = camera.found().filter(|_| spline.is_none()).collect();
     for i in 0..found.len() {
         for j in i + 1..found.len() {
@@ -251,7 +251,7 @@ fn of_camera(camera: &CameraEstimate) -> String {
             }
         }
     }
-    let _ = writeln!(text, "view             corners  rms px  outliers");
+    let _ = writeln!(text, "view             corners  RMS px  outliers");
     for view in &camera.views {
         let (corners, outliers) = (view.corners.len(), view.outlier_count());
         let name = shown(&view.name);
@@ -260,10 +260,10 @@ fn of_camera(camera: &CameraEstimate) -> String {
     text
 }
 
-/// What a calibration is worth, in a line.
+/// Summarizes the quality of a calibration in one line.
 fn headline(estimate: &Estimate) -> String {
     let mut text = format!(
-        "{}, {}, rms {:.4} px a coordinate",
+        "{}, {}, RMS {:.4} px per axis",
         counted(estimate.frames.len(), "view"),
         counted(estimate.corner_count(), "corner"),
         estimate.rms_px

@@ -1,4 +1,4 @@
-//! The page about a calibration, with the photographs that it shows.
+//! The report of a calibration, with the photographs that it shows.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -14,11 +14,11 @@ use deltille::report::{Report, Sample, shown_views, thumbnail};
 use deltille_core::name::is_within;
 use deltille_core::words::counted;
 
-/// Most small pictures of views that were held out.
+/// Largest number of thumbnails of held-out views.
 const MOST_HELD_OUT: usize = 100;
 
 impl Calibrated {
-    /// Writes the page; `folders` are those of each camera's photographs.
+    /// Writes the report; `folders` contains the photograph folder of each camera.
     pub fn write_page(
         &self,
         page: &Path,
@@ -33,7 +33,7 @@ impl Calibrated {
             let shown = Sample::best(camera, is_there).map(|view| view.name.as_str());
             let held_out = self.estimate.held_out.iter().flat_map(|test| test.cameras.get(index));
             let held_out = held_out.flat_map(|camera| &camera.views).take(MOST_HELD_OUT);
-            // No more than the page shows, and the one that is undistorted.
+            // Reads only the views shown in the report, and the one that is undistorted.
             let more = camera.views.iter().filter(|view| shown == Some(view.name.as_str()));
             let views = shown_views(camera).into_iter().chain(more).chain(held_out);
             let mut done = BTreeSet::new();
@@ -57,8 +57,8 @@ impl Calibrated {
     }
 }
 
-/// The picture of a view, in 8 bits. One that is not there leaves its place to the corners, as does one that cannot be
-/// read or is not of the size that the camera has, which is told.
+/// Returns the image of a view in 8 bits. Without an image, the report shows the corners only. Warns if the image
+/// cannot be read or its size differs from that of the camera.
 fn picture(image: &str, folder: &Path, size_px: [u32; 2]) -> Option<Gray<u8>> {
     let path = picture_of(image, folder)?;
     let picture = match photograph::read(&path) {
@@ -70,7 +70,7 @@ fn picture(image: &str, folder: &Path, size_px: [u32; 2]) -> Option<Gray<u8>> {
     };
     if [picture.width(), picture.height()] != size_px.map(|side| side as usize) {
         tell!(
-            "warning: --images: {} has {} × {} px, the camera {} × {}",
+            "warning: --images: {} has {} × {} px, but the camera has {} × {}",
             path.display(),
             picture.width(),
             picture.height(),
@@ -85,19 +85,19 @@ fn picture(image: &str, folder: &Path, size_px: [u32; 2]) -> Option<Gray<u8>> {
     })
 }
 
-/// The picture of a view in a folder, or in one within it. What a file calls the picture leads nowhere else.
+/// Returns the path of a view's image in a folder or one of its subfolders. Names in the file cannot lead elsewhere.
 fn picture_of(image: &str, folder: &Path) -> Option<PathBuf> {
     is_within(image).then(|| folder.join(image)).filter(|path| path.is_file())
 }
 
-/// Refuses what is no folder, and tells which pictures of the views are not in it.
+/// Rejects paths that are not folders, and warns about missing images of views.
 pub fn check_images(folder: &Path, views: &[View]) -> anyhow::Result<()> {
-    ensure!(folder.is_dir(), "--images: {} is no folder", folder.display());
+    ensure!(folder.is_dir(), "--images: {} is not a folder", folder.display());
     let missing = views.iter().filter(|view| picture_of(&view.image, folder).is_none());
     let missing: Vec<&str> = missing.map(|view| view.image.as_str()).collect();
     if let Some(first) = missing.first() {
         tell!(
-            "warning: --images: {} of {} are not in {}, such as {first}",
+            "warning: --images: {} of {} are missing in {}, such as {first}",
             missing.len(),
             counted(views.len(), "picture"),
             folder.display()

@@ -36,39 +36,39 @@ use deltille_core::words::counted;
 /// Arguments of `deltille rig`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A camera and the folder of its detections, such as left=corners/left; once for each, the
-    /// first is the rig's frame. Pictures of one moment have the same file name in each folder
+    /// Camera and the folder of its detections, such as left=corners/left; once per camera, and the first defines the
+    /// rig's frame. Images taken at the same time have the same file name in each folder
     #[arg(long, required = true, value_name = "NAME=FOLDER", value_parser = named)]
     camera: Vec<(String, PathBuf)>,
-    /// Description of the target: the .json that was written with it; once for each of several targets that do not
-    /// move against each other, of which no camera need see more than one
+    /// Target description: the .json written with the target; repeatable for several targets that do not move
+    /// relative to each other (no camera needs to see more than one)
     #[arg(long, required_unless_present = "grid", value_name = "FILE")]
     target: Vec<PathBuf>,
     #[command(flatten)]
     grid: GridArgs,
-    /// What is to be found of each camera, see `deltille calibrate`
+    /// Camera model of every camera, see `deltille calibrate`
     #[arg(long, default_value = "radtan")]
     model: ModelChoice,
-    /// A camera that is known already and kept, with its file
+    /// Camera with known, fixed intrinsics, and its file
     #[arg(long, value_name = "NAME=FILE", value_parser = named)]
     known: Vec<(String, PathBuf)>,
-    /// Use --target even where the detections, or the camera, name another target
+    /// Use --target even if the detections or the camera name another target
     #[arg(long)]
     assume_target: bool,
     #[command(flatten)]
     sheet: SheetArgs,
-    /// Find where the target's panels are on it, and write that as <target>-refined.json
+    /// Also estimate the poses of the target's panels, and write them as <target>-refined.json
     #[arg(long, conflicts_with_all = ["print_scale", "grid"])]
     refine_target: bool,
     #[command(flatten)]
     solve: SolveArgs,
-    /// A camera and the folder of its photographs, for small pictures on the page
+    /// Camera and the folder of its photographs, for thumbnails in the report
     #[arg(long, value_name = "NAME=FOLDER", value_parser = named, requires = "report")]
     images: Vec<(String, PathBuf)>,
-    /// What to write beside rig.json and <camera>.yaml; several may be given, separated by commas
+    /// Output formats in addition to rig.json and <camera>.yaml, separated by commas
     #[arg(long, value_delimiter = ',', value_parser = format(RIG_FORMATS))]
     format: Vec<&'static RigFormat>,
-    /// Folder for rig.json, <camera>.yaml and the refined target
+    /// Output folder for rig.json, <camera>.yaml and the refined target
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
     #[command(flatten)]
@@ -82,7 +82,7 @@ fn named(text: &str) -> Result<(String, PathBuf), String> {
         Some((name, path)) if !path.is_empty() => {
             Name::new(name).map(|name| (name.to_string(), path.into()))
         }
-        _ => Err("give a name and a path, such as left=corners/left".to_owned()),
+        _ => Err("expected a name and a path, such as left=corners/left".to_owned()),
     }
 }
 
@@ -90,7 +90,7 @@ fn named(text: &str) -> Result<(String, PathBuf), String> {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.camera.len() < 2 && !args.refine_target {
         bail!(
-            "--camera: a rig has at least two; `deltille calibrate` takes one, and so does --refine-target"
+            "--camera: a rig needs at least two cameras, or one with --refine-target; use `deltille calibrate` for one camera"
         );
     }
     let names: Vec<&str> = args.camera.iter().map(|(name, _)| name.as_str()).collect();
@@ -158,7 +158,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let of_test = solved.estimate.held_out.iter().flat_map(|test| &test.excluded);
     for out in solved.estimate.excluded.iter().chain(of_test) {
-        tell!("{}: left out: {}", out.shown(), out.reason);
+        tell!("{}: excluded: {}", out.shown(), out.reason);
     }
     if let Err(foreign) = solved.tell() {
         report(&foreign.context("--known"));
@@ -190,7 +190,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 impl Args {
-    /// What is known of a camera.
+    /// Returns the intrinsics of a camera.
     fn intrinsics(&self, name: &str, targets: &[Target]) -> anyhow::Result<Intrinsics> {
         let known = of_name(&self.known, name)
             .map(|path| camera_file::read_to_keep("--known", path).map(|file| (path, file)));
@@ -203,7 +203,7 @@ impl Args {
         Ok(known.unwrap_or(Intrinsics::Unknown(self.model.richest())))
     }
 
-    /// Refuses before the work what could not be written after it.
+    /// Rejects files that could not be written, before the work starts.
     fn check_files(&self, cameras: &[Intrinsics], printed: &[Printing]) -> anyhow::Result<()> {
         let samples: Vec<Camera> = cameras.iter().map(sample).collect();
         let cameras = self.camera.iter().zip(&samples);
@@ -215,7 +215,7 @@ impl Args {
         check_places(&self.output, &files, self.overwrite)
     }
 
-    /// All files, and why some formats have none; `json` is the text that tells all.
+    /// Returns all files, and errors for the formats that failed; `json` is the complete result.
     fn files(
         &self,
         cameras: &[(&str, &Camera, Pose)],
@@ -228,7 +228,7 @@ impl Args {
         let failed = saved::failures(json).into_iter().next();
         for (name, camera, _) in cameras {
             let camera = (*camera).clone();
-            // A camera that was given was calibrated elsewhere.
+            // A known camera was calibrated before.
             let is_known = of_name(&self.known, name).is_some();
             let calibrated_with = if is_known { Vec::new() } else { found.calibrated_with.clone() };
             let failed = failed.clone().filter(|_| !is_known);
@@ -236,10 +236,10 @@ impl Args {
             files.push(text_file(format!("{name}.yaml"), yaml));
         }
         if failed.is_some() {
-            // No other file would carry the reason.
+            // Only rig.json contains the reason of a failure.
             if !self.format.is_empty() || self.refine_target || found.map.is_some() {
                 tell!(
-                    "warning: only rig.json and the cameras are written, as the calibration failed"
+                    "warning: only rig.json and the cameras were written, because the calibration failed"
                 );
             }
             return Ok((files, refused));
@@ -261,7 +261,7 @@ impl Args {
         Ok((files, refused))
     }
 
-    /// A target as it was found, where that was asked for.
+    /// Returns the estimated target, if requested.
     fn files_of_target(&self, found: &Estimate, printing: &Printing) -> anyhow::Result<Vec<File>> {
         let target = &printing.target;
         let refined = self.refine_target.then(|| found.refined(target));
@@ -272,7 +272,7 @@ impl Args {
         let place = self.output.join(format!("{name}.json"));
         ensure!(
             !self.target.iter().any(|given| same_file(&place, given)),
-            "-o: {} would overwrite the target that was given: choose another folder",
+            "-o: {} would overwrite the target description; use another folder",
             place.display()
         );
         let printing = Printing { target, ..printing.clone() };
@@ -283,19 +283,18 @@ impl Args {
     }
 }
 
-/// Refuses names of cameras that cannot be names of files, or not of different ones.
+/// Rejects camera names that are not valid or not distinct file names.
 fn check_names(names: &[&str]) -> anyhow::Result<()> {
     for (index, name) in names.iter().enumerate() {
         let is_same = |other: &&&str| other.to_lowercase() == name.to_lowercase();
         let is_taken = ["rig", "camchain"].iter().any(|own| is_same(&own));
         if is_taken || name.contains(['/', '\\']) || name.starts_with('.') {
-            bail!("--camera: {name} cannot be the name of a file");
+            bail!("--camera: {name} is not a valid file name");
         }
         match names[..index].iter().find(is_same) {
-            Some(other) if other == name => bail!("--camera: {name} is named twice"),
+            Some(other) if other == name => bail!("--camera: {name} is given twice"),
             Some(other) => bail!(
-                "--camera: {other} and {name} differ in case only, and some systems take their files \
-                 for one"
+                "--camera: {other} and {name} differ only in case, so their files would collide on some systems"
             ),
             None => {}
         }
@@ -303,11 +302,11 @@ fn check_names(names: &[&str]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Refuses a folder that is given for two cameras.
+/// Rejects folders that are given for two cameras.
 fn check_folders(cameras: &[(String, PathBuf)]) -> anyhow::Result<()> {
     let mut places: Vec<(PathBuf, &str)> = Vec::new();
     for (name, folder) in cameras {
-        // What is not there is told where it is read.
+        // Missing folders are reported when they are read.
         let Ok(place) = folder.canonicalize() else { continue };
         if let Some((_, other)) = places.iter().find(|(there, _)| *there == place) {
             bail!("--camera: {other} and {name} have the same folder, {}", folder.display());
@@ -317,7 +316,7 @@ fn check_folders(cameras: &[(String, PathBuf)]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Refuses pictures that another camera has too: of the same size, but of two cameras never the same corners.
+/// Rejects images that another camera has too: two cameras never detect exactly the same corners.
 fn check_own(
     name: &str,
     detections: &[(String, Detection)],
@@ -328,31 +327,31 @@ fn check_own(
             theirs.iter().any(|(_, of_other)| sightings::is_same(&own.1, of_other))
         };
         if let Some((picture, _)) = detections.iter().find(is_theirs) {
-            bail!("--camera {name}: {picture} has the same corners as a picture of {other}");
+            bail!("--camera {name}: {picture} has the same corners as an image of {other}");
         }
     }
     Ok(())
 }
 
-/// Refuses names that are no camera's, or given twice.
+/// Rejects names of unknown cameras, and duplicates.
 fn check_named(option: &str, given: &[(String, PathBuf)], cameras: &[&str]) -> anyhow::Result<()> {
     for (index, (name, _)) in given.iter().enumerate() {
         if given[..index].iter().any(|(other, _)| other == name) {
             bail!("{option}: {name} is given twice");
         }
         if !cameras.contains(&name.as_str()) {
-            bail!("{option}: there is no --camera {name}");
+            bail!("{option}: no --camera is named {name}");
         }
     }
     Ok(())
 }
 
-/// What was given for a camera.
+/// Returns the path given for a camera.
 fn of_name<'a>(given: &'a [(String, PathBuf)], name: &str) -> Option<&'a Path> {
     given.iter().find(|(of, _)| of == name).map(|(_, path)| path.as_path())
 }
 
-/// The largest deviations of a place and a turn.
+/// Returns the largest standard deviations of a position and a rotation.
 fn within(sd: &[f64; 6]) -> String {
     let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
     format!(" ± {:.3} mm, {:.4}°", largest(&sd[3..]), largest(&sd[..3]).to_degrees())
@@ -362,7 +361,7 @@ fn summary(solved: &Calibrated) -> String {
     let estimate = &solved.estimate;
     let headline = |estimate: &Estimate| {
         format!(
-            "{}, rms {:.4} px{}",
+            "{}, RMS {:.4} px{}",
             counted(estimate.frames.len(), "frame"),
             estimate.rms_px,
             without_outliers(estimate.outlier_count(), estimate.inlier_rms_px())
@@ -375,7 +374,7 @@ fn summary(solved: &Calibrated) -> String {
         let at = camera.camera_from_rig.inverse().translation;
         let deviation = camera.pose_sd.map_or(String::new(), |sd| within(&sd));
         lines.push(format!(
-            "{}: {} corners, rms {:.4} px{}, fx {fx:.2}, fy {fy:.2}; at ({}) mm{deviation}",
+            "{}: {} corners, RMS {:.4} px{}, fx {fx:.2}, fy {fy:.2}; at ({}) mm{deviation}",
             camera.name,
             camera.corner_count(),
             camera.rms_px,

@@ -1,4 +1,4 @@
-//! What was photographed, and the detections of it: the options of commands that calibrate.
+//! Input options of the calibration commands: the target and its detections.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -29,15 +29,15 @@ use deltille_core::words::counted;
 /// Detections and what they show.
 #[derive(clap::Args)]
 pub struct SightingsArgs {
-    /// Detections, what `deltille detect` wrote as .json or .parquet, or folders of it
+    /// Detections (.json or .parquet) from `deltille detect`, or folders of them
     #[arg(required = true, value_name = "DETECTIONS")]
     detections: Vec<PathBuf>,
-    /// Description of the target: the .json of `deltille board`, or a .dsc
+    /// Target description: the .json of `deltille board`, or a .dsc
     #[arg(long, value_name = "FILE")]
     target: Option<PathBuf>,
     #[command(flatten)]
     grid: GridArgs,
-    /// Use the target that is given even where the detections name another one
+    /// Use --target even if the detections name another target
     #[arg(long)]
     assume_target: bool,
     #[command(flatten)]
@@ -46,31 +46,31 @@ pub struct SightingsArgs {
     limits: FileLimits,
 }
 
-/// An untagged board that no file describes.
+/// An untagged board without a description file.
 #[derive(clap::Args)]
 pub struct GridArgs {
-    /// An untagged board of this tiling instead; --edge says how large
+    /// Tiling of an untagged board, instead of --target; --edge gives its scale
     #[arg(long, value_name = "KIND", requires = "edge", conflicts_with = "target")]
     grid: Option<Kind>,
-    /// Rows of corners of the untagged board
+    /// Number of corner rows of the untagged board
     #[arg(long, requires_all = ["grid", "cols"], value_parser = whole(SIDES))]
     rows: Option<u32>,
-    /// Corners in each row of the untagged board
+    /// Number of corners per row of the untagged board
     #[arg(long, requires_all = ["grid", "rows"], value_parser = whole(SIDES))]
     cols: Option<u32>,
-    /// Length of a tile's edge of the untagged board, such as 20mm
+    /// Edge length of a tile of the untagged board, such as 20mm
     #[arg(long, requires = "grid", value_name = "LENGTH", allow_hyphen_values = true)]
     edge: Option<String>,
 }
 
-/// What is known of the sheet beforehand.
+/// Known properties of the printed sheet.
 #[derive(clap::Args)]
 pub struct SheetArgs {
-    /// How the print came out, measured length over stated length of the check bars: across and up
-    /// the sheet, such as 0.9973,0.9981, or one number for both
+    /// Scale of the print, measured over nominal length of the check bars: across and up the sheet, such as
+    /// 0.9973,0.9981, or one number for both
     #[arg(long, value_name = "ACROSS,UP", value_parser = scale, allow_hyphen_values = true)]
     print_scale: Option<[f64; 2]>,
-    /// How the sheet is bent and printed, found before: the .json of `calibrate --board-shape`
+    /// Known bend and print scale of the sheet: the .json of `calibrate --board-shape`
     #[arg(long, value_name = "FILE", conflicts_with = "print_scale")]
     shape: Option<PathBuf>,
 }
@@ -78,15 +78,15 @@ pub struct SheetArgs {
 fn scale(text: &str) -> Result<[f64; 2], String> {
     let parts: Vec<&str> = text.split(',').collect();
     let number = |part: &str| {
-        // Farther from its size no print is: the bars were misread.
-        print_scale::RANGE
-            .parse(part)
-            .map_err(|_| format!("`{part}` is no measured length over stated length, near 1"))
+        // Beyond this range, the bars were misread.
+        print_scale::RANGE.parse(part).map_err(|_| {
+            format!("`{part}` is not a valid ratio of measured to nominal length (near 1)")
+        })
     };
     match parts.as_slice() {
         [both] => Ok([number(both)?; 2]),
         [across, up] => Ok([number(across)?, number(up)?]),
-        _ => Err("give one number, or two: across and up the sheet".to_owned()),
+        _ => Err("expected one number, or two (across and up the sheet)".to_owned()),
     }
 }
 
@@ -101,22 +101,22 @@ enum Kind {
 /// Views, and the panels that they show.
 pub struct Sightings {
     pub views: Vec<View>,
-    /// A calibration of what was photographed, as yet without cameras.
+    /// The calibration problem, without cameras yet.
     pub calibration: Calibration,
-    /// What was photographed, with its corners where the plan has them.
+    /// The target, with nominal corner positions.
     pub target: Option<Printing>,
-    /// Files of the detections in which no view was found.
+    /// Detection files without a view.
     pub empty: Vec<PathBuf>,
-    /// What does not belong to the target.
+    /// Detections that do not belong to the target.
     pub left_out: Vec<Excluded>,
-    /// What is known of the print.
+    /// Known properties of the print.
     pub print: Print,
-    /// What is to be noted of detections that do not name their target.
+    /// Note about detections that do not name their target.
     pub unnamed: Option<String>,
 }
 
 impl GridArgs {
-    /// The board, if there is one.
+    /// Returns the board, if given.
     pub fn read(&self) -> anyhow::Result<Option<UntaggedGrid>> {
         let (Some(kind), Some(edge)) = (self.grid, &self.edge) else { return Ok(None) };
         let kind = match kind {
@@ -129,23 +129,23 @@ impl GridArgs {
         Ok(Some(UntaggedGrid { kind, edge_mm, size }))
     }
 
-    /// The board as a target, if there is one, where it must be known which corner is which; and the board.
+    /// Returns the board and the target made from it, if given; requires a size that identifies each corner.
     pub fn read_target(&self) -> anyhow::Result<Option<(UntaggedGrid, Target)>> {
         let Some(grid) = self.read()? else { return Ok(None) };
         let made = grid
             .target("board")
-            .context("--grid: give --rows and --cols, so that it is known which corner is which")?;
+            .context("--grid needs --rows and --cols to identify the corners")?;
         Ok(Some((grid, made.context("--grid")?)))
     }
 }
 
 impl SightingsArgs {
-    /// Whether the target is taken as it is given, whatever detections and cameras name.
+    /// Whether the given target overrides the one named in detections and cameras.
     pub fn assumes_target(&self) -> bool {
         self.assume_target
     }
 
-    /// Reads everything. Where the target is to be measured, it takes views whose labels are sure.
+    /// Reads all input. To measure the target, only views with certain labels are used.
     pub fn read(&self, measure_target: bool) -> anyhow::Result<Sightings> {
         let limits = self.limits.limits();
         let target = self.target.as_deref().map(|path| target_file::read_placed(path, &limits));
@@ -154,7 +154,7 @@ impl SightingsArgs {
             (Some(printing), _) => Reference::Target(&printing.target),
             (None, Some(grid)) => Reference::Grid(grid),
             _ => bail!(
-                "give --target FILE, or --grid deltille or checker with --edge for untagged boards"
+                "--target FILE is needed, or --grid deltille or checker with --edge for untagged boards"
             ),
         };
         let sheet = self.sheet.read(&limits, &reference.identities(), target.as_slice())?;
@@ -162,9 +162,9 @@ impl SightingsArgs {
             read(&self.detections, &reference, &limits, self.assume_target)?;
         let board = match reference {
             Reference::Grid(grid) if measure_target => {
-                let made = grid.target("board").context(
-                    "--measure-target: give --rows and --cols, so that it is known which corner is which",
-                )?;
+                let made = grid
+                    .target("board")
+                    .context("--measure-target needs --rows and --cols to identify the corners")?;
                 Some(made.context("--measure-target")?)
             }
             _ => None,
@@ -184,7 +184,7 @@ impl SightingsArgs {
 }
 
 impl SheetArgs {
-    /// The sheet, where nothing is known as it was planned; `printed` are the targets with their sheets.
+    /// Reads the sheet properties, or returns the nominal sheet; `printed` contains the targets with their sheets.
     pub fn read(
         &self,
         limits: &Limits,
@@ -206,28 +206,28 @@ impl SheetArgs {
     }
 }
 
-/// Takes out the views of which it is not known which corner is which, and tells them.
+/// Removes and reports the views in which corners cannot be identified.
 pub fn take_sure(views: &mut Vec<View>, reference: &Reference) -> anyhow::Result<Vec<Excluded>> {
     let is_any_sure = views.iter().any(|view| reference.is_sure_of(view));
     ensure!(
         is_any_sure || views.is_empty(),
-        "--measure-target: none of {} shows all corners of the board, without tags it is measured where it is seen \
-         whole",
+        "--measure-target: none of {} shows all corners of the board; an untagged board must be fully visible to be \
+         measured",
         counted(views.len(), "picture")
     );
     let unsure = views.extract_if(.., |view| !reference.is_sure_of(view));
     Ok(unsure.map(|view| left_out(view, NOT_WHOLE)).collect())
 }
 
-/// Takes out the views of an untagged board in which it is not known which corner is which, and tells them.
+/// Removes and reports the views of an untagged board in which corners cannot be identified.
 pub fn take_known(views: &mut Vec<View>, reference: &Reference) -> Vec<Excluded> {
     let unknown = views.extract_if(.., |view| !reference.labels_are_of_board(view));
     unknown.map(|view| left_out(view, IN_PART)).collect()
 }
 
-/// A view that takes no part, which is told.
+/// Reports an excluded view.
 fn left_out(view: View, why: &str) -> Excluded {
-    tell!("left out: {}: {why}", view.name);
+    tell!("excluded: {}: {why}", view.name);
     Excluded {
         camera: None,
         corners: view.corner_count(),
@@ -238,49 +238,49 @@ fn left_out(view: View, why: &str) -> Excluded {
     }
 }
 
-/// Why a view cannot tell which corner is which.
-const IN_PART: &str = "the board is not seen from its first row and column to its last: without tags its corners are \
-                       not known then";
+/// Why a view cannot identify the corners.
+const IN_PART: &str = "the board is not fully visible in both directions, so its corners cannot be identified without \
+                       tags";
 
 /// Why a view cannot measure an untagged board.
 const NOT_WHOLE: &str =
-    "a board without tags is measured where it is seen whole: its corners have no ids";
+    "an untagged board must be fully visible to be measured, because its corners have no ids";
 
-/// Where the panels of what was photographed are, see [`Sheet::panels`].
+/// Returns the panel positions of the target, see [`Sheet::panels`].
 pub fn panels(reference: &Reference, sheet: &Sheet) -> anyhow::Result<Vec<PanelPlace>> {
     sheet.panels(reference).map_err(told)
 }
 
-/// Moves the corners of all views to where their sheet has them, see [`Sheet::put_on`].
+/// Moves the corners of all views to their positions on the sheet, see [`Sheet::put_on`].
 pub fn put_on(sheet: &Sheet, target: Option<&Target>, views: &mut [View]) -> anyhow::Result<()> {
     sheet.put_on(target, views).map_err(told)
 }
 
-/// What is wrong with a sheet, in words of the command line.
+/// Describes an error of a sheet in terms of command-line options.
 fn told(error: SheetUseError) -> anyhow::Error {
     match error {
         SheetUseError::Loose => anyhow!(
-            "--target: boards of one file that lie about have no place in a scene: make a file for each"
+            "--target: loose boards in one file have no known relative pose; make a file for each board"
         ),
         _ => error.into(),
     }
 }
 
-/// What detections show.
+/// Content of detections.
 pub struct Read {
     pub views: Vec<View>,
-    /// Files of detections that show none.
+    /// Detection files that show no target.
     pub empty: Vec<PathBuf>,
-    /// What does not belong to the target.
+    /// Detections that do not belong to the target.
     pub left_out: Vec<Excluded>,
-    /// What the pictures say together of the ink on the print.
+    /// Joint estimate of the ink spread from all images.
     pub ink: Option<InkEstimate>,
     /// The detections.
     pub detections: Vec<(String, Detection)>,
 }
 
-/// The views that detections show, files or folders of them. What does not belong to the target is
-/// told on standard error, too. Where the target is assumed, it does not matter which one the detections name.
+/// Reads the views in detection files or folders. Reports detections that do not belong to the target on standard
+/// error. If the target is assumed, the names in the detections are ignored.
 pub fn read(
     paths: &[PathBuf],
     reference: &Reference,
@@ -294,7 +294,7 @@ pub fn read(
         let show = || path.display().to_string();
         let text = match limits.read_text(&path) {
             Err(ReadError::NotText { .. }) => bail!(
-                "{}: no text: pictures go to `deltille detect`, what it writes goes here",
+                "{}: this is not a text file; for an image, run `deltille detect` first",
                 show()
             ),
             text => text?,
@@ -308,11 +308,11 @@ pub fn read(
         copies.extend(add(&mut detections, &mut files, (name, found), path));
     }
     for Tables { files: of_table, folder } in tables {
-        // Beside the detections one by one they would count twice.
+        // Counted twice together with the JSON detections.
         if let Some(one) =
             folder.and_then(|folder| files.iter().find(|file| file.parent() == Some(&folder)))
         {
-            tell!("left out: {}: {} says the same", of_table[0].display(), one.display());
+            tell!("excluded: {}: {} contains the same data", of_table[0].display(), one.display());
             continue;
         }
         for (name, found) in of_tables(&of_table, limits)? {
@@ -323,29 +323,26 @@ pub fn read(
     if let Some((copy, first)) = copies.first() {
         let others = match copies.len() - 1 {
             0 => String::new(),
-            others => format!("; {others} more likewise"),
+            others => format!("; {others} more are duplicates"),
         };
         let (copy, first) = (copy.display(), first.display());
-        tell!("warning: {copy}: the same corners as in {first}, counted once{others}");
+        tell!("warning: {copy}: duplicate of {first}, counted once{others}");
     }
     if let Some(first) = foreign.first() {
         let count = counted(foreign.len(), "file");
         ensure!(
             !files.is_empty(),
-            "{}: no detection among the .json files: make some with `deltille detect`",
+            "{}: no .json file contains a detection; run `deltille detect` first",
             first.parent().unwrap_or(first).display()
         );
-        tell!(
-            "left out: {count} in the folder that hold no detection, such as {}",
-            first.display()
-        );
+        tell!("excluded: {count} in the folder without a detection, such as {}", first.display());
     }
     if is_assumed {
         assume(&mut detections, reference);
     }
     let Shown { views, empty, left_out, .. } = views(&detections, reference)?;
     for (index, out) in &left_out {
-        tell!("warning: left out: {}: {}", files[*index].display(), out.reason);
+        tell!("warning: excluded: {}: {}", files[*index].display(), out.reason);
     }
     ensure!(!views.is_empty(), nothing_shown(&detections));
     let empty = empty.into_iter().map(|index| files[index].clone()).collect();
@@ -354,7 +351,7 @@ pub fn read(
     Ok(Read { views, empty, left_out, ink, detections })
 }
 
-/// Takes all detections for those of the targets that are given, and notes once where they name another one.
+/// Assigns all detections to the given targets; notes once if they name another target.
 fn assume(detections: &mut [(String, Detection)], reference: &Reference) {
     let given = reference.identities();
     let mut replaced: Vec<([TargetIdentity; 2], usize)> = Vec::new();
@@ -366,11 +363,11 @@ fn assume(detections: &mut [(String, Detection)], reference: &Reference) {
     }
     for ([seen, own], count) in replaced {
         let detections = counted(count, "detection");
-        tell!("note: --assume-target: {detections} of {seen} are taken for {own}");
+        tell!("note: --assume-target: {detections} of {seen} are assigned to {own}");
     }
 }
 
-/// That no picture shows the target, with the reason that most of them give.
+/// Reports that no image shows the target, with the most frequent reason.
 fn nothing_shown(detections: &[(String, Detection)]) -> String {
     let mut given = BTreeMap::new();
     for (_, found) in detections {
@@ -382,10 +379,10 @@ fn nothing_shown(detections: &[(String, Detection)]) -> String {
     let pictures = counted(detections.len(), "picture");
     let most = given.into_values().max_by_key(|(count, _)| *count);
     let why = most.map(|(count, why)| format!("; {count} of them: {why}")).unwrap_or_default();
-    format!("no board of this kind in {pictures}{why}")
+    format!("no board of this kind found in {pictures}{why}")
 }
 
-/// What is to be noted where some of the detections that show something do not say which target they are of.
+/// Returns a note if some non-empty detections do not name their target.
 pub fn unnamed<'a>(
     detections: impl IntoIterator<Item = &'a (String, Detection)>,
     reference: &Reference,
@@ -398,13 +395,13 @@ pub fn unnamed<'a>(
     let detections = if all == 1 { "detection does" } else { "detections do" };
     (unnamed > 0).then(|| {
         format!(
-            "note: {unnamed} of {all} {detections} not name the target that they were made with; assumed to be {}",
+            "note: {unnamed} of {all} {detections} not name a target; assumed to be {}",
             target.identity()
         )
     })
 }
 
-/// What detections say together of the ink; pictures that do not allow for it are told on standard error.
+/// Estimates the ink spread jointly from all detections; warns about images detected without it.
 fn ink_of(detections: &[(String, Detection)], reference: &Reference) -> Option<InkEstimate> {
     let on_print = |ink: InkEstimate| match reference {
         Reference::Grid(grid) => ink.on_print(grid.edge_mm),
@@ -416,7 +413,7 @@ fn ink_of(detections: &[(String, Detection)], reference: &Reference) -> Option<I
     let without = found.iter().filter(|ink| !ink.used).count();
     if ink.used && without > 0 {
         tell!(
-            "warning: {ink}, but {} of {} do not allow for it: detect all in one run",
+            "warning: {ink}, but {} of {} were detected without it; detect all images in one run",
             counted(without, "picture"),
             found.len()
         );
@@ -424,14 +421,14 @@ fn ink_of(detections: &[(String, Detection)], reference: &Reference) -> Option<I
     Some(ink)
 }
 
-/// Whether two detections are of one picture, whatever it is called: noise makes no corners twice.
+/// Whether two detections are of the same image, under any name: noise never produces identical corners.
 pub fn is_same(one: &Detection, other: &Detection) -> bool {
-    // Tables have no tags.
+    // Tables contain no tags.
     let corners = one.grids.iter().map(|grid| &grid.corners);
     !one.grids.is_empty() && corners.eq(other.grids.iter().map(|grid| &grid.corners))
 }
 
-/// Adds a detection, unless it is of a picture that is there: then returns its file, and the file of the other.
+/// Adds a detection, unless it duplicates another; then returns both files.
 fn add(
     detections: &mut Vec<(String, Detection)>,
     files: &mut Vec<PathBuf>,
@@ -446,7 +443,7 @@ fn add(
     None
 }
 
-/// The detections of tables, in the order in which their files would be as JSON.
+/// Reads the detections in tables, in the order that their JSON files would have.
 fn of_tables(files: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<(String, Detection)>> {
     let pictures = detection_tables::read(files, limits)?;
     let all = pictures.len();
@@ -455,7 +452,7 @@ fn of_tables(files: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<(String, 
     if found.len() < all {
         let unread = counted(all - found.len(), "picture");
         let folder = files[0].parent().unwrap_or(&files[0]);
-        tell!("left out: {unread} of the tables in {} that could not be read", folder.display());
+        tell!("excluded: {unread} of the tables in {} that could not be read", folder.display());
     }
     let stem = |image: &str| {
         let stem = Path::new(image).file_stem();
@@ -463,7 +460,7 @@ fn of_tables(files: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<(String, 
     };
     let stems: BTreeSet<String> = found.iter().map(|found| stem(&found.image)).collect();
     let are_told_apart = stems.len() == found.len();
-    // Pictures of several folders may have one name; then the folders are part of theirs.
+    // If images in several folders have the same name, the folder becomes part of it.
     let name = |found: &Detection| {
         let image = &found.image;
         let stem = stem(image);
@@ -481,23 +478,23 @@ fn of_tables(files: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<(String, 
     Ok(named)
 }
 
-/// Where detections may be.
+/// Possible detection files.
 struct Places {
     texts: Vec<Place>,
     tables: Vec<Tables>,
 }
 
-/// A file of a detection.
+/// A detection file.
 struct Place {
     path: PathBuf,
-    /// Given by name, not only in a folder that was.
+    /// Named directly, not found in a named folder.
     is_named: bool,
 }
 
-/// Files of tables that belong together.
+/// Table files that belong together.
 struct Tables {
     files: Vec<PathBuf>,
-    /// The folder that was named, if they were not.
+    /// The named folder, if the files themselves were not named.
     folder: Option<PathBuf>,
 }
 
@@ -534,7 +531,7 @@ fn places(paths: &[PathBuf]) -> anyhow::Result<Places> {
     Ok(Places { texts, tables })
 }
 
-/// The JSON files of a folder, in the order of their names.
+/// Returns the JSON files of a folder, sorted by name.
 fn in_folder(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let show = || format!("cannot read {}", folder.display());
     let mut files = Vec::new();

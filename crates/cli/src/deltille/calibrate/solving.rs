@@ -1,4 +1,4 @@
-//! What commands that calibrate have in common: how they solve, and what they tell.
+//! Options and output that the calibration commands share.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -27,64 +27,63 @@ use deltille::targets::{self, parse_length_mm};
 use deltille_core::quantity::board_accuracy_mm;
 use deltille_core::words::counted;
 
-/// How a calibration is solved, and the page about it.
+/// Options of the solver and the report.
 #[derive(clap::Args)]
 pub struct SolveArgs {
-    /// Keep every N-th view (the N-th, 2N-th, …), of a rig every N-th frame, out of the calibration and tell
-    /// the error there, where only poses are found
+    /// Hold out every N-th view (N, 2N, …), or every N-th frame of a rig, and report its error with only poses
+    /// estimated
     #[arg(long, value_name = "N", value_parser = whole(2..=u32::MAX))]
     holdout: Option<u32>,
-    /// How corners far off their prediction count
+    /// Robust loss for outliers
     #[arg(long, value_name = "LOSS", default_value = "huber")]
     robust: Robust,
-    /// How corners are weighted
+    /// Weights of the corners
     #[arg(long, value_name = "BY", default_value = "covariance")]
     weights: Weighting,
-    /// Find how the sheet of the board is bent, stretched and sheared, too, and whether that is more
-    /// than chance
+    /// Also estimate how the board is bent, stretched and sheared, and test whether this is significant
     #[arg(long, conflicts_with = "shape")]
     board_shape: bool,
-    /// Find the place of every corner of the target, too, and write it as a measured target
+    /// Also estimate the position of every target corner, and write a measured target
     #[arg(long, conflicts_with_all = ["shape", "board_shape"])]
     measure_target: bool,
-    /// Standard deviation of a coordinate of the board's corners from the description, such as 0.05mm, or 0 of
-    /// an exact board; it is in the observed deviations [default: what a measured target says of itself, else
-    /// 0.1 mm, at most 0.5 % of an edge]
+    /// Standard deviation of the board's corners from the description per axis, such as 0.05mm, or 0 for an exact
+    /// board; included in the observed standard deviations [default: that of a measured target, otherwise 0.1 mm, at
+    /// most 0.5 % of an edge]
     #[arg(long, value_name = "LENGTH", value_parser = accuracy)]
     board_accuracy: Option<f64>,
-    /// Distance of points for which the uncertainty of projections is told beside that at infinity, such as 2m;
-    /// several may be given, separated by commas [default: the median distance of the corners]
+    /// Distances at which to report the projection uncertainty in addition to infinity, such as 2m, separated by
+    /// commas [default: the median distance of the corners]
     #[arg(long, value_name = "LENGTH", value_delimiter = ',', value_parser = distance)]
     uncertainty_at: Vec<f64>,
-    /// List every corner with its residual in the .json, too, 150 bytes each
+    /// Include every corner with its residual in the .json (150 bytes each)
     #[arg(long)]
     residuals: bool,
-    /// Write a page that shows what the calibration is worth, and what would make it better
+    /// Write an HTML report on the quality of the calibration, and how to improve it
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
 }
 
-/// How corners far off count.
+/// Robust loss of corners.
 #[derive(Clone, Copy, ValueEnum)]
 enum Robust {
-    /// In full: least squares
+    /// Least squares: all residuals have full influence
     None,
-    /// Beyond three standard deviations with a constant force
+    /// Residuals beyond 3σ have constant influence
     Huber,
-    /// Beyond three standard deviations hardly
+    /// Residuals beyond 3σ have almost no influence
     Cauchy,
 }
 
-/// How corners are weighted.
+/// Weights of corners.
 #[derive(Clone, Copy, ValueEnum)]
 enum Weighting {
-    /// All corners alike
+    /// Equal weights for all corners
     Equal,
-    /// By the detections' covariances, with a common deviation found beside them
+    /// Weights from the covariances of the detections, scaled by a common estimated factor
     Covariance,
 }
 
-/// A model, or the choice of one.
+/// A model, or automatic selection.
 #[derive(Clone, Copy, PartialEq)]
 pub enum ModelChoice {
     Auto,
@@ -99,7 +98,7 @@ impl FromStr for ModelChoice {
             "auto" => Ok(Self::Auto),
             _ => text.parse().map(Self::Model).map_err(|error: ModelError| {
                 format!(
-                    "{error}, or auto, which takes the one that holds views best that took no part"
+                    "{error}, or auto, which selects the model with the lowest error on held-out views"
                 )
             }),
         }
@@ -107,7 +106,7 @@ impl FromStr for ModelChoice {
 }
 
 impl ModelChoice {
-    /// The model with the most parameters that may be chosen.
+    /// Returns the candidate model with the most parameters.
     pub fn richest(self) -> Model {
         match self {
             Self::Auto => Model::ThinPrism,
@@ -115,7 +114,7 @@ impl ModelChoice {
         }
     }
 
-    /// As it was given.
+    /// Returns the name as typed on the command line.
     pub fn name(self) -> String {
         match self {
             Self::Auto => "auto".to_owned(),
@@ -123,7 +122,7 @@ impl ModelChoice {
         }
     }
 
-    /// Sets the model of a camera that is not known; returns what was tried where it was to be chosen.
+    /// Sets the model of an unknown camera; returns the candidates if it was selected automatically.
     pub fn choose(
         self,
         calibration: &mut Calibration,
@@ -138,7 +137,7 @@ impl ModelChoice {
     }
 }
 
-/// What models that were tried leave on views that took no part, in lines; none where none were.
+/// Formats the held-out errors of the candidate models, one per line; empty without candidates.
 pub fn chosen(tried: &[Candidate]) -> String {
     if tried.is_empty() {
         return String::new();
@@ -146,11 +145,11 @@ pub fn chosen(tried: &[Candidate]) -> String {
     let mut text = "model            parameters  held out px\n".to_owned();
     for candidate in tried {
         let held_out =
-            candidate.held_out_px.map_or("no camera".to_owned(), |px| format!("{px:.4}"));
+            candidate.held_out_px.map_or("did not converge".to_owned(), |px| format!("{px:.4}"));
         let note = match (candidate.chosen, candidate.holds) {
             (true, _) => "  taken",
             (_, true) => "  as good",
-            _ if candidate.held_out_px.is_some() && !candidate.is_stable => "  not told apart",
+            _ if candidate.held_out_px.is_some() && !candidate.is_stable => "  ill-conditioned",
             _ => "",
         };
         // Writing to a String cannot fail.
@@ -164,19 +163,19 @@ pub fn chosen(tried: &[Candidate]) -> String {
     text
 }
 
-/// What came of a calibration.
+/// Result of a calibration.
 pub struct Calibrated {
     pub estimate: Estimate,
     pub diagnoses: Vec<Diagnosis>,
-    /// Where the target's file has its panels.
+    /// Panel positions in the target's file.
     pub stated: Vec<PanelPlace>,
     pub print: Print,
-    /// Models that were tried, by camera.
+    /// Candidate models, by camera.
     pub models: Vec<Vec<Candidate>>,
 }
 
 impl SolveArgs {
-    /// Samples of what [`Calibrated::measured`] will be.
+    /// Returns placeholders of the files of [`Calibrated::measured`].
     pub fn planned(&self, stem: &str) -> Vec<File> {
         let file = |end: &str, text: String| text_file(format!("{stem}-measured.{end}"), text);
         let empty = || target_map_svg(&TargetMap::new(Vec::new(), [0.0; 2]));
@@ -186,17 +185,17 @@ impl SolveArgs {
         }
     }
 
-    /// Whether the places of the target's corners are to be found.
+    /// Whether the positions of the target's corners are estimated.
     pub fn measures_target(&self) -> bool {
         self.measure_target
     }
 
-    /// Whether files list every corner with its residual.
+    /// Whether files include every corner with its residual.
     pub fn residuals(&self) -> Residuals {
         if self.residuals { Residuals::Listed } else { Residuals::LeftOut }
     }
 
-    /// Solves, and says what is to be said about it; `tried` are the models that were tried, by camera.
+    /// Calibrates; `tried` contains the candidate models by camera.
     pub fn solve(
         &self,
         calibration: Calibration,
@@ -237,7 +236,8 @@ impl SolveArgs {
         })?;
         let diagnoses = calibration.explain(&estimate);
         let stated = calibration.panels().to_vec();
-        // The page compares models where none were to be chosen from; too few views for that are no error.
+        // The report compares models even if none was selected automatically; too few views for this are not an
+        // error.
         let compared = |(camera, tried): (usize, Vec<Candidate>)| match tried.is_empty() {
             true if self.report.is_some() => calibration.compare_models(camera).unwrap_or_default(),
             _ => tried,
@@ -246,8 +246,8 @@ impl SolveArgs {
         Ok(Calibrated { estimate, diagnoses, stated, print, models })
     }
 
-    /// Where the page goes, `<stem>-report.html` in a folder. What would be refused is refused here, before the
-    /// work.
+    /// Returns the path of the report (`<stem>-report.html` in a folder). Rejects unusable paths before the work
+    /// starts.
     pub fn page(&self, stem: &str, overwrite: Overwrite) -> anyhow::Result<Option<PathBuf>> {
         let Some(page) = &self.report else { return Ok(None) };
         let is_page = page.is_dir() || page.extension().is_some_and(|end| end == "html");
@@ -260,7 +260,7 @@ impl SolveArgs {
 }
 
 impl Calibrated {
-    /// Tells the diagnoses on standard error; an error where a known camera did not take its pictures.
+    /// Prints the diagnoses on standard error. Fails if the images were not taken by a fixed camera.
     pub fn tell(&self) -> anyhow::Result<()> {
         let words = Words::new(&self.estimate, self.print.scale);
         for diagnosis in &self.diagnoses {
@@ -274,7 +274,7 @@ impl Calibrated {
         Ok(())
     }
 
-    /// Exit code 1 where what was found is not to be used as it is.
+    /// Returns exit code 1 if the result must not be used unchanged.
     pub fn exit_code(&self) -> ExitCode {
         match self.has_failed() {
             true => ExitCode::from(FAILED),
@@ -286,13 +286,15 @@ impl Calibrated {
         self.diagnoses.iter().any(Diagnosis::is_failure)
     }
 
-    /// The measured target and its picture, `<stem>-measured.json` and `.svg`; none where it was not measured.
+    /// Returns the measured target and its drawing, `<stem>-measured.json` and `.svg`; empty if it was not measured.
     pub fn measured(&self, stem: &str, printing: Option<&Printing>) -> Vec<File> {
         let Some((map, printing)) = self.estimate.map.as_ref().zip(printing) else {
             return Vec::new();
         };
         if self.has_failed() {
-            tell!("warning: --measure-target: no target is written, as the calibration failed");
+            tell!(
+                "warning: --measure-target: no target was written, because the calibration failed"
+            );
             return Vec::new();
         }
         let file = |end: &str, text: String| text_file(format!("{stem}-measured.{end}"), text);
@@ -300,26 +302,27 @@ impl Calibrated {
         vec![file("json", measured.to_json()), file("svg", target_map_svg(map))]
     }
 
-    /// What is known of the print and the sheet, a line each.
+    /// Describes the print and the sheet, one property per line.
     pub fn lines(&self) -> Vec<String> {
         let shape = self.estimate.shape.as_ref().map(told);
         let ink = self.print.ink.filter(|ink| ink.used);
-        let ink = ink.map(|ink| format!("ink: {ink}, which the corners allow for"));
+        let ink = ink.map(|ink| format!("ink: {ink}; corners are corrected for it"));
         let views = self.estimate.views_of_a_corner();
         let map = self.estimate.map.as_ref().map(|map| mapped(map, views));
         shape.into_iter().chain(map).chain(ink).collect()
     }
 }
 
-/// Tells formats that cannot carry what was found; exit code 1 where there are such, as not all is there that was asked for.
+/// Reports formats that cannot represent the result; returns exit code 1 if there are any, because the output is
+/// incomplete.
 pub fn left_out(refused: &[FormatError]) -> Option<ExitCode> {
     for error in refused {
-        tell!("error: --format: {error}: left out, all else is written");
+        tell!("error: --format: {error}; skipped, all other files were written");
     }
     (!refused.is_empty()).then(|| ExitCode::from(FAILED))
 }
 
-/// How far corners of a board are off, mm.
+/// Parses the standard deviation of a board's corners, mm.
 fn accuracy(text: &str) -> Result<f64, String> {
     if text.trim() == "0" {
         return Ok(0.0);
@@ -328,7 +331,7 @@ fn accuracy(text: &str) -> Result<f64, String> {
     board_accuracy_mm::RANGE.check(mm).map_err(|error| error.to_string())
 }
 
-/// How sure projections are where corners were, a line for each camera of which it is known.
+/// Describes the projection uncertainty in the region of the corners; `None` if unknown.
 pub fn sureness(camera: &CameraEstimate) -> Option<String> {
     let far = |mm: Option<f64>| mm.map_or("infinity".to_owned(), |mm| format!("{mm:.0} mm"));
     let distances = camera.projection.iter().flat_map(|known| &known.distances_mm);
@@ -342,14 +345,14 @@ pub fn sureness(camera: &CameraEstimate) -> Option<String> {
     let told: Vec<String> = told.collect();
     let observed = camera.projection.as_ref().and_then(|known| known.observed.as_ref());
     let board = match observed.is_some_and(|observed| observed.of_board.is_some()) {
-        true => "; observed deviations allow for errors of the board (--board-accuracy)",
+        true => "; observed uncertainty includes errors of the board (--board-accuracy)",
         false => "",
     };
-    (!told.is_empty()).then(|| format!("projections are known to: {}{board}", told.join("; ")))
+    (!told.is_empty()).then(|| format!("projection uncertainty (1σ): {}{board}", told.join("; ")))
 }
 
-/// A camera that has all parameters that are found, and none of them zero: what a format cannot carry of it is
-/// told before the work.
+/// Returns a camera with nonzero values for all estimated parameters, to reject formats that cannot represent it
+/// before the work starts.
 pub fn sample(intrinsics: &Intrinsics) -> Camera {
     match intrinsics {
         Intrinsics::Unknown(model) => {
@@ -362,43 +365,46 @@ pub fn sample(intrinsics: &Intrinsics) -> Camera {
     }
 }
 
-/// The places of the corners, and whether they are more than chance.
+/// Describes the estimated corner positions, and their significance.
 fn mapped(map: &TargetMap, views: usize) -> String {
     let [plane, out] = map.rms_mm();
     let few = match views >= LEAST_TO_MEASURE {
         true => String::new(),
         false => {
-            format!("; a corner is in {}, take {LEAST_TO_MEASURE} or more", counted(views, "view"))
+            format!(
+                "; a corner is in {}, but {LEAST_TO_MEASURE} or more are recommended",
+                counted(views, "view")
+            )
         }
     };
     let left = match map.few {
         0 => String::new(),
         few => format!(
-            "; {} not measured, as most of the observations are outliers or fewer than two count",
+            "; {} not measured (most observations are outliers, or fewer than two are usable)",
             counted(few, "corner")
         ),
     };
     format!(
-        "target: corners are {plane:.3} mm beside their places and {out:.3} mm above or below (rms a \
-         coordinate), {} of {} by more than chance makes{few}{left}",
+        "target: corners deviate by {plane:.3} mm in the plane and {out:.3} mm out of it (RMS per axis), {} of {} \
+         significantly{few}{left}",
         map.significant().count(),
         map.corners().len()
     )
 }
 
-/// The shape of a sheet, and whether it is to be believed.
+/// Describes the shape of a sheet, and its significance.
 fn told(found: &BoardShape) -> String {
     let significance = match found.is_significant() {
-        true => "more than chance makes",
-        false => "no more than chance makes: take the calibration without",
+        true => "significant",
+        false => "not significant: calibrate without --board-shape",
     };
     format!(
-        "sheet: bent by {:.3} mm, corners up to {:.3} mm beside their places, F = {:.1}, {significance}",
+        "sheet: bent by {:.3} mm, corners displaced by up to {:.3} mm, F = {:.1}, {significance}",
         found.bent_mm, found.stretched_mm, found.f_ratio
     )
 }
 
-/// What is left where corners are outliers, for the end of a line.
+/// Formats the RMS without outliers for the end of a line, if there are any.
 pub fn without_outliers(outliers: usize, inlier_rms_px: f64) -> String {
     match outliers {
         0 => String::new(),

@@ -1,4 +1,4 @@
-//! Cameras from files.
+//! Camera files.
 
 use std::path::Path;
 
@@ -11,19 +11,19 @@ use deltille::export::saved;
 use deltille::targets::{Target, TargetIdentity, check_same_board};
 use deltille_core::words::shown;
 
-/// Reads the camera file that an option names.
+/// Reads the camera file given by an option.
 pub fn read(option: &str, path: &Path) -> anyhow::Result<Camera> {
     read_with_targets(option, path).map(|file| file.camera)
 }
 
-/// Reads a camera file with the targets that the camera was calibrated with, and warns where its calibration failed.
+/// Reads a camera file with the targets of its calibration, and warns if the calibration failed.
 pub fn read_with_targets(option: &str, path: &Path) -> anyhow::Result<CameraFile> {
     let file = camera_file::read_with_targets(path).context(option.to_owned())?;
     warn_of(path, file.failed.as_deref());
     Ok(file)
 }
 
-/// Refuses a camera that was calibrated with a target that has the tags of one of these at another size.
+/// Rejects a camera that was calibrated with a target of the same tags at another size.
 pub fn check_targets(
     path: &Path,
     calibrated_with: &[TargetIdentity],
@@ -32,11 +32,11 @@ pub fn check_targets(
     let own: Vec<TargetIdentity> = targets.iter().map(Target::identity).collect();
     let camera = path.display().to_string();
     check_same_board([&camera, "--target"], [calibrated_with, &own]).map_err(|problem| {
-        anyhow!("{problem}; give its description, or --assume-target to use this one")
+        anyhow!("{problem}; use that target's description, or --assume-target to use this one")
     })
 }
 
-/// The same, or with `is_assumed` a note where it would be refused.
+/// Calls [`check_targets`]; with `is_assumed`, prints a note instead of failing.
 pub fn check_or_note(
     path: &Path,
     calibrated_with: &[TargetIdentity],
@@ -50,7 +50,7 @@ pub fn check_or_note(
                     |identity| identity.map_or(String::new(), |identity| identity.to_string()),
                 );
             tell!(
-                "note: --assume-target: {} was made with {seen}, taken for {own}",
+                "note: --assume-target: {} was made with {seen}, assumed to be {own}",
                 path.display()
             );
             Ok(())
@@ -59,7 +59,7 @@ pub fn check_or_note(
     }
 }
 
-/// Warns where the calibration whose text this is has failed, and says why it has.
+/// Warns if the calibration in `text` failed; returns the reason.
 pub fn warn_if_failed(path: &Path, text: &str) -> Option<String> {
     let failure = saved::failures(text).into_iter().next();
     warn_of(path, failure.as_deref());
@@ -72,12 +72,12 @@ fn warn_of(path: &Path, failure: Option<&str>) {
     }
 }
 
-/// Reads a camera to be kept as it is in another calibration: refused where its own calibration failed.
+/// Reads a camera to be fixed in another calibration; fails if its own calibration failed.
 pub fn read_to_keep(option: &str, path: &Path) -> anyhow::Result<CameraFile> {
     let file = camera_file::read_with_targets(path).context(option.to_owned())?;
     match &file.failed {
         Some(failed) => Err(anyhow!(
-            "{option}: {}: its calibration failed: {}; calibrate the camera again",
+            "{option}: {}: the calibration failed: {}; calibrate the camera again",
             path.display(),
             shown(failed)
         )),
@@ -85,7 +85,7 @@ pub fn read_to_keep(option: &str, path: &Path) -> anyhow::Result<CameraFile> {
     }
 }
 
-/// Reads a camera file for these targets, see [`check_targets`]; with `is_assumed` it may be any camera's, which is noted.
+/// Reads a camera file for these targets, see [`check_targets`]; with `is_assumed`, a mismatch causes only a note.
 pub fn read_for(
     option: &str,
     path: &Path,

@@ -1,4 +1,4 @@
-//! Tables of detections in a folder: what is written of a run, and what is read of one.
+//! Detection tables in a folder, written by one run and read by another.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -16,12 +16,12 @@ use deltille::limits::Limits;
 use deltille::targets::Target;
 use deltille_core::words::counted;
 
-/// The files of both tables in a folder.
+/// Returns the paths of both tables in a folder.
 pub fn files(folder: &Path) -> [PathBuf; 2] {
     [CORNERS, PICTURES].map(|table| folder.join(format!("{table}.{EXTENSION}")))
 }
 
-/// Tables on their way to a folder. Pictures are written in their order, whichever is done first.
+/// Tables being written. Images are written in order, whichever is finished first.
 pub struct Tables {
     folder: PathBuf,
     state: Mutex<State>,
@@ -31,14 +31,14 @@ struct State {
     staging: Staging,
     writer: Writer<BufWriter<File>>,
     next: usize,
-    /// Done before one that comes earlier; `None` where no row is to be written.
+    /// Images finished before an earlier one; `None` if no row is to be written.
     waiting: BTreeMap<usize, Option<Picture>>,
     written: BTreeSet<String>,
     error: Option<anyhow::Error>,
 }
 
 impl Tables {
-    /// Begins both tables of a folder.
+    /// Creates both tables of a folder.
     pub fn begin(folder: &Path, targets: &[Target]) -> anyhow::Result<Self> {
         let cannot = || format!("cannot write to {}", folder.display());
         let staging = Staging::new(folder).with_context(cannot)?;
@@ -57,7 +57,7 @@ impl Tables {
         Ok(Self { folder: folder.to_owned(), state: Mutex::new(state) })
     }
 
-    /// Adds what came of the picture of a number; `None` where it has no row.
+    /// Adds the result of the image at `index`; `None` if it has no row.
     pub fn add(&self, index: usize, picture: Option<Picture>) {
         let mut state = self.state();
         state.waiting.insert(index, picture);
@@ -69,10 +69,10 @@ impl Tables {
         }
     }
 
-    /// Puts both tables into their folder, with rows of `earlier` of pictures that were not looked at.
+    /// Moves both tables into their folder, with the rows of `earlier` for images that were not processed.
     pub fn finish(self, earlier: &[Picture]) -> anyhow::Result<()> {
         let mut state = self.state.into_inner().expect("no thread panics here");
-        // After an interruption there are gaps.
+        // An interruption leaves gaps.
         for picture in std::mem::take(&mut state.waiting).into_values().flatten() {
             state.push(&picture);
         }
@@ -103,17 +103,17 @@ impl State {
     }
 }
 
-/// Refuses to replace what is no such table.
+/// Refuses to replace files that are not such tables.
 pub fn check(folder: &Path, overwrite: Overwrite) -> anyhow::Result<()> {
     files(folder).iter().try_for_each(|path| overwrite.check(path, &Kind::own_parquet()))
 }
 
-/// Whether a folder has both.
+/// Whether a folder contains both tables.
 pub fn are_in(folder: &Path) -> bool {
     files(folder).iter().all(|file| file.exists())
 }
 
-/// The pictures of an earlier run into a folder; none where it has no tables.
+/// Returns the images of an earlier run in a folder; empty without tables.
 pub fn earlier(folder: &Path, limits: &Limits) -> anyhow::Result<Vec<Picture>> {
     let files = files(folder);
     match files.iter().any(|file| file.exists()) {
@@ -122,13 +122,13 @@ pub fn earlier(folder: &Path, limits: &Limits) -> anyhow::Result<Vec<Picture>> {
     }
 }
 
-/// The pictures of tables, from their files.
+/// Reads the images of table files.
 pub fn read(files: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<Picture>> {
     let read = folder::read(files, limits)?;
     if read.short > 0 {
         let have = if read.short == 1 { "has" } else { "have" };
         tell!(
-            "warning: {} {have} fewer corners than were found in it",
+            "warning: {} {have} fewer corners than were detected",
             counted(read.short, "picture")
         );
     }

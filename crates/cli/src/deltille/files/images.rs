@@ -1,4 +1,4 @@
-//! Which images a command works on: files, folders, patterns, and lists on standard input.
+//! Input images of a command: files, folders, patterns, and lists on standard input.
 
 use std::collections::BTreeMap;
 use std::io::BufRead;
@@ -6,25 +6,25 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
-/// Endings of the files that are taken from a folder; files named outright may end in anything.
+/// Extensions of the files used from a folder; files named directly may have any extension.
 const EXTENSIONS: [&str; 11] =
     ["png", "jpg", "jpeg", "tif", "tiff", "bmp", "pgm", "ppm", "pnm", "pbm", "webp"];
 
-/// Images in the order of the arguments; those listed on standard input are read as they come.
+/// Images in the order of the arguments; a list on standard input is read as it arrives.
 pub struct Images {
     named: Vec<PathBuf>,
-    /// The position in `named` before which the list on standard input comes.
+    /// Index in `named` before which the list on standard input is inserted.
     listed: Option<usize>,
 }
 
 impl Images {
-    /// Looks up folders and patterns.
+    /// Expands folders and patterns.
     pub fn of(arguments: &[PathBuf]) -> anyhow::Result<Self> {
         let mut images = Self { named: Vec::new(), listed: None };
         for argument in arguments {
             if argument.as_os_str() == "-" {
                 if images.listed.replace(images.named.len()).is_some() {
-                    bail!("-: standard input is named twice");
+                    bail!("-: standard input is given twice");
                 }
             } else if argument.is_dir() {
                 images.named.extend(in_folder(argument)?);
@@ -37,17 +37,17 @@ impl Images {
         Ok(images)
     }
 
-    /// The images that are known before any is looked at.
+    /// Returns the images that are known in advance.
     pub fn named(&self) -> &[PathBuf] {
         &self.named
     }
 
-    /// How many there are, where that is known.
+    /// Returns the number of images, if known.
     pub fn count(&self) -> Option<usize> {
         self.listed.is_none().then_some(self.named.len())
     }
 
-    /// All images; a line that cannot be read ends the list with an error.
+    /// Iterates over all images; an unreadable line ends the list with an error.
     pub fn iter(&self) -> impl Iterator<Item = anyhow::Result<PathBuf>> + Send + '_ {
         let (before, after) = self.named.split_at(self.listed.unwrap_or(0));
         let lines = self.listed.map(|_| std::io::BufReader::new(std::io::stdin()).lines());
@@ -60,7 +60,7 @@ impl Images {
     }
 }
 
-/// The images right inside a folder, by name; an error where there are none.
+/// Returns the images directly inside a folder, sorted by name; fails if there are none.
 fn in_folder(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let images = photographs_in(folder)?;
     if images.is_empty() {
@@ -69,7 +69,7 @@ fn in_folder(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     Ok(images)
 }
 
-/// The images right inside a folder, by name, and none where there are none.
+/// Returns the images directly inside a folder, sorted by name; may be empty.
 pub fn photographs_in(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder);
     let entries = entries.with_context(|| format!("cannot read {}", folder.display()))?;
@@ -77,7 +77,7 @@ pub fn photographs_in(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     for entry in entries {
         let path = entry.with_context(|| format!("cannot read {}", folder.display()))?.path();
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        // Pictures that an earlier run drew are no photographs.
+        // Overlays drawn by an earlier run are not photographs.
         let drawn = path.to_string_lossy().ends_with(".overlay.png");
         if extension.is_some_and(|e| EXTENSIONS.contains(&e.as_str())) && !drawn && path.is_file() {
             images.push(path);
@@ -87,13 +87,13 @@ pub fn photographs_in(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     Ok(images)
 }
 
-/// The files that a pattern with `*`, `?` or `[…]` matches; what is no pattern stays as it is, to be
-/// reported when it is opened.
+/// Returns the files that match a pattern with `*`, `?` or `[…]`. Other arguments are returned unchanged; errors are
+/// reported when they are opened.
 fn matching(argument: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let Some(pattern) = argument.to_str().filter(|text| text.contains(['*', '?', '['])) else {
         return Ok(vec![argument.to_owned()]);
     };
-    let paths = glob::glob(pattern).with_context(|| format!("{pattern}: not a pattern"))?;
+    let paths = glob::glob(pattern).with_context(|| format!("{pattern}: invalid pattern"))?;
     let images: Vec<PathBuf> = paths.flatten().filter(|path| path.is_file()).collect();
     if images.is_empty() {
         bail!("{pattern}: no file matches");
@@ -101,27 +101,27 @@ fn matching(argument: &Path) -> anyhow::Result<Vec<PathBuf>> {
     Ok(images)
 }
 
-/// What an image's results are called, but for their endings.
+/// Returns the stem of an image's result files.
 pub fn stem(image: &Path) -> anyhow::Result<String> {
     match image.file_stem() {
         Some(stem) => Ok(stem.to_string_lossy().into_owned()),
-        None => bail!("{} is not a file name", image.display()),
+        None => bail!("{} is not a valid file name", image.display()),
     }
 }
 
-/// Names of results, one per image.
+/// Unique stems of result files, one per image.
 #[derive(Default)]
 pub struct Stems {
     taken: BTreeMap<String, PathBuf>,
 }
 
 impl Stems {
-    /// The stem of an image's results, which no other image may have.
+    /// Returns the stem of an image's result files; fails if another image has the same.
     pub fn claim(&mut self, image: &Path) -> anyhow::Result<String> {
         let stem = stem(image)?;
         if let Some(other) = self.taken.insert(stem.clone(), image.to_owned()) {
             bail!(
-                "{} and {} would both be written under the name {stem}: give them different folders with -o",
+                "{} and {} would both be written as {stem}; process them separately with different -o folders",
                 other.display(),
                 image.display()
             );

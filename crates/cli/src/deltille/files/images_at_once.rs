@@ -1,4 +1,4 @@
-//! Images worked on at a time, as many as there are threads, and as their pixels allow.
+//! Parallel processing of images, limited by threads and by total pixels.
 
 use std::path::PathBuf;
 use std::sync::{Condvar, Mutex, MutexGuard};
@@ -8,8 +8,8 @@ use rayon::ThreadPool;
 use deltille::limits::Limits;
 use deltille::photograph;
 
-/// Does some work on each of the images, whose number it is told, on the threads of a pool. Images
-/// that are in memory together have no more pixels than one may have.
+/// Calls a function with each image and its index, on the threads of a pool. Images in memory together have no more
+/// pixels than the limit for one.
 pub fn for_each(
     pool: &ThreadPool,
     limits: &Limits,
@@ -18,8 +18,8 @@ pub fn for_each(
 ) {
     let images = Mutex::new(images.enumerate());
     let memory = Memory { most: limits.max_pixels, used: Mutex::default(), freed: Condvar::new() };
-    // Threads of the pool never wait for memory: one that does would hold up the images of others,
-    // parts of which it works on.
+    // The threads of the pool never wait for memory: a waiting thread would delay the images of others, because it
+    // works on parts of them.
     std::thread::scope(|scope| {
         for _ in 0..pool.current_num_threads() {
             scope.spawn(|| {
@@ -36,21 +36,21 @@ pub fn for_each(
     });
 }
 
-/// Pixels that may be in memory.
+/// Budget of pixels in memory.
 struct Memory {
     most: u64,
     used: Mutex<u64>,
     freed: Condvar,
 }
 
-/// Some of them, until it is dropped.
+/// A share of the budget, released when dropped.
 struct Taken<'a> {
     memory: &'a Memory,
     pixels: u64,
 }
 
 impl Memory {
-    /// Takes so many, or all there are, as soon as they are free.
+    /// Waits until this many pixels, or all of a smaller budget, are free, and takes them.
     fn take(&self, pixels: u64) -> Taken<'_> {
         let pixels = pixels.min(self.most);
         let is_short = |used: &mut u64| *used > self.most - pixels;

@@ -1,4 +1,4 @@
-//! Targets from files, with the families that they name.
+//! Target files, with the families that they name.
 
 use std::path::{Path, PathBuf};
 
@@ -12,19 +12,19 @@ use deltille::limits::Limits;
 use deltille::target_file::{self, TargetFamilyError};
 use deltille::targets::Target;
 
-/// Reads a target with its sheets: `.dsc` by its extension, JSON otherwise.
+/// Reads a target with its sheets: `.dsc` files by their extension, JSON otherwise.
 pub fn read(path: &Path, limits: &Limits) -> anyhow::Result<Printing> {
     Ok(target_file::read(path, limits)?)
 }
 
-/// The same where poses are asked for; tells where a `.dsc` lacks those of its boards.
+/// Like [`read`], for commands that need poses; warns if a `.dsc` lacks the poses of its boards.
 pub fn read_placed(path: &Path, limits: &Limits) -> anyhow::Result<Printing> {
     let target = read(path, limits)?;
     tell_missing(path, &target.target);
     Ok(target)
 }
 
-/// The same of several files, see [`read_all`].
+/// Like [`read_placed`], for several files, see [`read_all`].
 pub fn read_all_placed(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<Printing>> {
     let targets = read_each(paths, limits)?;
     paths.iter().zip(&targets).for_each(|(path, target)| tell_missing(path, &target.target));
@@ -37,7 +37,7 @@ fn tell_missing(path: &Path, target: &Target) {
     }
 }
 
-/// The targets of several files, which can be told apart.
+/// Reads the targets of several files, which must be distinguishable.
 pub fn read_all(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<Target>> {
     Ok(read_each(paths, limits)?.into_iter().map(|printing| printing.target).collect())
 }
@@ -49,7 +49,7 @@ fn read_each(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<Printing>
     Ok(targets)
 }
 
-/// Sets the family of each of several targets; a file that is given is that of those which name its family.
+/// Sets the family of each target; a given file applies to the targets that name its family.
 pub fn set_families(targets: &mut [Target], given: Option<&str>) -> anyhow::Result<()> {
     if let [only] = targets {
         return set_family(only, given);
@@ -62,7 +62,7 @@ pub fn set_families(targets: &mut [Target], given: Option<&str>) -> anyhow::Resu
     if let Some(name) = &name
         && !targets.iter().any(names_it)
     {
-        bail!("--family: no target carries tags of {name}");
+        bail!("--family: no target has tags of {name}");
     }
     targets.iter_mut().try_for_each(|target| {
         let given = given.filter(|_| names_it(target));
@@ -74,7 +74,7 @@ pub fn set_families(targets: &mut [Target], given: Option<&str>) -> anyhow::Resu
 pub fn set_family(target: &mut Target, given: Option<&str>) -> anyhow::Result<()> {
     target_file::set_family(target, given).map_err(|error| match error {
         TargetFamilyError::Named { .. } => {
-            anyhow!(error).context("give the family's file with --family")
+            anyhow!(error).context("set the family file with --family")
         }
         _ => anyhow!(error).context("--family"),
     })

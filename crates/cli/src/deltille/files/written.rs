@@ -1,4 +1,4 @@
-//! The files of a command, written all or none.
+//! Output files of a command, written all or none.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ use deltille::targets;
 /// Writes one file to a path.
 type Writer = dyn Fn(&Path) -> anyhow::Result<()>;
 
-/// A file to be written: its name, and what writes it.
+/// An output file: its name, and the function that writes it.
 pub struct File {
     name: String,
     kind: Kind,
@@ -27,7 +27,7 @@ pub struct File {
 }
 
 impl File {
-    /// A file of that name and kind, written by `write`.
+    /// Creates a file with this name and kind, written by `write`.
     pub fn new(
         name: String,
         kind: Kind,
@@ -45,18 +45,18 @@ pub struct Formats {
     pub png: bool,
 }
 
-/// A file of text.
+/// Creates a text file.
 pub fn text_file(name: String, text: String) -> File {
     bytes_file(name, text.into_bytes())
 }
 
-/// A file of bytes.
+/// Creates a binary file.
 pub fn bytes_file(name: String, bytes: Vec<u8>) -> File {
     let kind = Kind::of(&bytes);
     File::new(name, kind, move |path| Ok(atomic::write(path, |out| out.write_all(&bytes))?))
 }
 
-/// The sheets of an artwork in some formats.
+/// Creates the files of an artwork in the given formats.
 pub fn drawn(name: &str, artwork: Artwork, formats: Formats, dpi: u32) -> Vec<File> {
     let artwork = Rc::new(artwork);
     let mut files = Vec::new();
@@ -89,31 +89,31 @@ pub fn drawn(name: &str, artwork: Artwork, formats: Formats, dpi: u32) -> Vec<Fi
     files
 }
 
-/// Whether a file that is to be written is one that is there already, by whatever path.
+/// Whether two paths, of an output file and an existing file, are the same file.
 pub fn same_file(written: &Path, other: &Path) -> bool {
     let [written, other] = [written, other].map(|path| path.canonicalize().ok());
     written.is_some() && written == other
 }
 
-/// A JSON of a schema in place of one that is still to be made, for [`check_places`].
+/// Returns a placeholder JSON of a schema, for [`check_places`].
 pub fn sample_of(schema: &str) -> String {
     format!("{{\"schema\": \"{schema}\"}}")
 }
 
-/// Refuses files that would be written over a folder, or over a file of another kind. A command that
-/// works long asks before, with samples.
+/// Rejects outputs that would replace a folder, or a file of another kind. Commands that run long call this first,
+/// with placeholders.
 pub fn check_places(folder: &Path, files: &[File], overwrite: Overwrite) -> anyhow::Result<()> {
     output::check_folder(folder).context("-o")?;
     files.iter().try_for_each(|file| {
         let path = folder.join(&file.name);
         let show = || format!("cannot write {}", path.display());
         atomic::check_place(&path).with_context(show)?;
-        ensure!(!path.is_dir(), "{}: there is a folder of that name", show());
+        ensure!(!path.is_dir(), "{}: it is a folder", show());
         overwrite.check(&path, &file.kind)
     })
 }
 
-/// Writes all files, all or none, and returns where they are, by the names that were asked for: see
+/// Writes all files, or none; returns their paths under their final names. See
 /// [`staging`](deltille::export::staging).
 pub fn write_all(
     folder: &Path,
@@ -123,7 +123,7 @@ pub fn write_all(
     Staged::new(folder, files, overwrite)?.commit()
 }
 
-/// Files that are written under temporary names, to appear together once all else is done; without that, they leave
+/// Files written under temporary names, to be moved into place together at the end. If dropped before, they leave
 /// nothing behind.
 pub struct Staged<'a> {
     folder: &'a Path,
@@ -151,10 +151,10 @@ impl<'a> Staged<'a> {
         Ok(Self { folder, files, overwrite, staging })
     }
 
-    /// Moves all files to their places.
+    /// Moves all files into place.
     pub fn commit(self) -> anyhow::Result<Vec<PathBuf>> {
         let Self { folder, files, overwrite, staging } = self;
-        // Drawing takes a while, and what is there may have changed.
+        // Drawing takes a while, and existing files may have changed.
         check_places(folder, files, overwrite)?;
         let staged = staging.files();
         for file in files.iter().filter(|_| !overwrite.is_forced()) {
@@ -167,7 +167,7 @@ impl<'a> Staged<'a> {
             replaced.extend(textures_replaced(folder, &staged, &names));
         }
         staging.commit().with_context(|| cannot_write_to(folder))?;
-        interrupt::stands("the files are whole, but were not all compared");
+        interrupt::stands("the files are complete, but not all were verified");
         replaced.iter().for_each(|line| tell!("{line}"));
         Ok(files.iter().map(|file| folder.join(&file.name)).collect())
     }
@@ -185,7 +185,7 @@ fn check_interrupt() -> anyhow::Result<()> {
 }
 
 impl File {
-    /// Refuses to replace the description of another board, without which its prints are of no use.
+    /// Refuses to replace the description of another board, because its prints cannot be used without it.
     fn check_board(&self, folder: &Path, staged: &Path) -> anyhow::Result<()> {
         if self.kind != Kind::of_schema(targets::SCHEMA) {
             return Ok(());
@@ -194,22 +194,21 @@ impl File {
         let new = fs::read(staged.join(&self.name)).unwrap_or_default();
         match lost_board(&path, &new) {
             Some(board) => bail!(
-                "{} describes another board, {board}, whose prints need it: keep both by another --name or -o, or \
-                 replace it with --force",
+                "{} describes another board, {board}, and its prints need this file; keep both with another --name or \
+                 -o, or use --force to replace it",
                 path.display()
             ),
             None => Ok(()),
         }
     }
 
-    /// What is to be said where this file replaces a symbolic link, or this description one that differs: files of the
-    /// earlier target may remain beside it.
+    /// Returns a note if this file replaces a symbolic link, or a different description whose other files may remain.
     fn replaced(&self, folder: &Path, staged: &Path, written: &[&str]) -> Option<String> {
         let path = folder.join(&self.name);
         if let Ok(old) = fs::read_link(&path) {
             let (path, old) = (path.display(), old.display());
             return Some(format!(
-                "{path}: replaced the symbolic link to {old}, which stays as it was"
+                "{path}: replaced the symbolic link to {old}; its destination is unchanged"
             ));
         }
         let is_other = self.kind == Kind::of_schema(targets::SCHEMA)
@@ -217,19 +216,19 @@ impl File {
             && !same_content(&path, &staged.join(&self.name));
         let stem = self.name.strip_suffix(".json").filter(|_| is_other)?;
         let left = own_left(folder, written, |name| is_of_target(name, stem));
-        let line = format!("{}: replaced a description that differed", path.display());
+        let line = format!("{}: replaced a different description", path.display());
         Some(match left.len() {
             0 => line,
             _ => format!(
-                "{line}; files of the earlier one remain beside it: {}: remove them, or write them again",
+                "{line}; files of the earlier target remain: {}; remove them, or write them again",
                 left.join(", ")
             ),
         })
     }
 }
 
-/// What is to be said where textures are written that are others than before, or fewer: textures and parts of the mesh that
-/// no mesh shows any more, and meshes that show what is no longer there.
+/// Returns a note if the written textures differ from existing ones: unused textures and mesh parts that remain, and
+/// meshes that use outdated textures.
 fn textures_replaced(folder: &Path, staged: &Path, written: &[&str]) -> Option<String> {
     let stem = written.iter().find_map(|name| name.strip_suffix(".json"))?;
     let is_texture = |name: &str| {
@@ -253,7 +252,7 @@ fn textures_replaced(folder: &Path, staged: &Path, written: &[&str]) -> Option<S
     let left = own_left(folder, written, |name| is_texture(name) || is_mesh(name));
     (!left.is_empty()).then(|| {
         format!(
-            "{}: of other textures than those written now: remove them, or write them anew",
+            "{}: these use other textures than the ones just written; remove them, or write them again",
             left.iter()
                 .map(|name| folder.join(name).display().to_string())
                 .collect::<Vec<_>>()
@@ -262,10 +261,10 @@ fn textures_replaced(folder: &Path, staged: &Path, written: &[&str]) -> Option<S
     })
 }
 
-/// Extensions of files that show the textures beside them, or go with one that does.
+/// Extensions of files that use the texture files, or belong to one that does.
 const TEXTURED: [&str; 6] = ["obj", "mtl", "sdf", "urdf", "xml", "usda"];
 
-/// Files in a folder that this program wrote earlier, of some names, in order.
+/// Returns the files in a folder that an earlier run of this program wrote under matching names, sorted.
 fn own_left(folder: &Path, written: &[&str], is_meant: impl Fn(&str) -> bool) -> Vec<String> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut left: Vec<String> = entries
@@ -277,7 +276,7 @@ fn own_left(folder: &Path, written: &[&str], is_meant: impl Fn(&str) -> bool) ->
     left
 }
 
-/// Whether a name is that of a file that is written for the target of that stem.
+/// Whether a file name is one that is written for the target with this stem.
 fn is_of_target(name: &str, stem: &str) -> bool {
     let Some((part, extension)) = name.strip_prefix(stem).and_then(|rest| rest.rsplit_once('.'))
     else {
@@ -302,7 +301,7 @@ mod tests {
     use super::is_of_target;
 
     #[test]
-    fn files_of_a_target_are_known_by_their_names() {
+    fn files_of_a_target_are_recognized_by_name() {
         for name in [
             "a.pdf",
             "a-12.svg",

@@ -16,23 +16,23 @@ use deltille::targets::{AprilGridSpec, TargetSpec, parse_length_mm};
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Tags in each row, and rows of tags, such as 6x6
+    /// Tags per row and number of rows, such as 6x6
     #[arg(long, value_name = "COLUMNSxROWS")]
     tags: Grid,
-    /// Side of a tag with its black border, Kalibr's tagSize, such as 25mm, 8.8cm, 1in
+    /// Side of a tag with its black border (Kalibr's tagSize), such as 25mm, 8.8cm, 1in
     #[arg(long, value_name = "LENGTH", default_value = "25mm", value_parser = parse_length_mm)]
     edge: f64,
-    /// Width of the gaps between tags, in tags, 0.1 to 0.9, Kalibr's tagSpacing
+    /// Gap between tags as a fraction of the tag's side, 0.1 to 0.9 (Kalibr's tagSpacing)
     #[arg(long, value_name = "TAGS", default_value_t = 0.3, value_parser = number(0.1..=0.9))]
     gap: f64,
-    /// Tag family: Kalibr reads aprilTag36h11 only
+    /// Tag family; Kalibr supports only aprilTag36h11
     #[arg(long, help_heading = TAGS, default_value = "aprilTag36h11")]
     family: String,
     /// Id of the first tag, at the lower left; the others follow row by row
     #[arg(long, help_heading = TAGS, value_name = "ID", default_value_t = 0,
           allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     first_id: u32,
-    /// Black border of a tag, in widths of a bit, 1 to 10: Kalibr reads 2 only, most others 1
+    /// Width of a tag's black border in cells, 1 to 10; Kalibr supports only 2, most others 1
     #[arg(long, help_heading = TAGS, value_name = "BITS", default_value_t = 2.0,
           value_parser = number(1.0..=10.0))]
     tag_border: f64,
@@ -46,7 +46,7 @@ pub struct Args {
     meshes: PlateMeshes,
 }
 
-/// Makes a grid, writes its files and that of Kalibr, and verifies what it wrote.
+/// Creates a grid, writes its files and Kalibr's target file, and verifies them.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     args.meshes.check_use(None)?;
     let is_made = args.meshes.is_any();
@@ -69,7 +69,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     match spec.to_kalibr_yaml() {
         Some(yaml) => files.push(text_file(format!("{}.yaml", printing.target.name), yaml)),
         None => tell!(
-            "no {}.yaml is written: Kalibr reads tags of aprilTag36h11 with a border of 2 bits only",
+            "{}.yaml was not written: Kalibr supports only aprilTag36h11 tags with a border of 2 bits",
             printing.target.name
         ),
     }

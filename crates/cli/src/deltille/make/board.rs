@@ -19,12 +19,12 @@ use deltille::lattice::GridKind;
 use deltille::layout::{Printing, tag_range};
 use deltille::targets::TargetSpec;
 
-/// Arguments of both.
+/// Arguments of both commands.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
     settings: BoardSettings,
-    /// Take what is not given here from a TOML file
+    /// Read settings that are not given as options from a TOML file
     #[arg(long, value_name = "FILE")]
     template: Option<PathBuf>,
     /// Write the settings as a TOML file
@@ -40,7 +40,7 @@ pub struct Args {
     laser: Laser,
 }
 
-/// Makes a board, writes its files, and verifies what it wrote.
+/// Creates a board, writes its files, and verifies them.
 pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     let given = args.settings.with(args.meshes, args.laser, args.finishing);
     let settings = match &args.template {
@@ -49,15 +49,15 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     };
     let (meshes, laser) = (settings.meshes(), &settings.laser);
     let mut plan = settings.plan(grid)?;
-    // A mesh, or a drawing for a laser, alone needs no paper.
+    // Meshes and laser drawings alone need no paper.
     plan.pdf &= settings.prints() || !(meshes.is_any() || laser.is_any());
     meshes.check_use(plan.spec.two_sided_mm)?;
     let family = plan.spec.tags.as_ref().map(|tags| family::resolve(&tags.family)).transpose();
     let family = match (family, grid) {
         (Err(FamilyFileError::Name(FamilyError::Unknown { name, .. })), GridKind::Checker) => {
             bail!(
-                "--tags: no family of square tags is called `{name}`: give {}, or the path of a .json \
-             family file",
+                "--tags: unknown family of square tags `{name}` (known: {}); use one of these, or the path of a .json \
+                 family file",
                 square_names()
                     .iter()
                     .map(|name| format!("{name} ({})", name.replacen("aprilTag", "t", 1)))
@@ -73,8 +73,8 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
         && !tags.spacing.is_multiple_of(2)
     {
         tell!(
-            "warning: --tag-spacing {}: with an odd number only every second of these squares has the \
-             colour of the tags, with an even one all have it",
+            "warning: --tag-spacing {}: with an odd number, only every second of these squares has the \
+             colour of the tags; with an even number, all of them have",
             tags.spacing
         );
     }
@@ -104,7 +104,7 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     Ok(delivered)
 }
 
-/// The files of a plan. What can be refused is refused here, before anything is written.
+/// Returns the files of a plan. Rejects invalid ones before anything is written.
 fn files(plan: &Plan, printing: &Printing) -> anyhow::Result<Vec<File>> {
     let name = &printing.target.name;
     let mut files = vec![text_file(format!("{name}.json"), printing.to_json())];
@@ -119,7 +119,7 @@ fn files(plan: &Plan, printing: &Printing) -> anyhow::Result<Vec<File>> {
     Ok(files)
 }
 
-/// One line on what was made.
+/// Describes the board in one line.
 fn summary(printing: &Printing) -> String {
     let target = &printing.target;
     let panels = &target.panels;

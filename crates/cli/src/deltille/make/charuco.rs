@@ -12,25 +12,25 @@ use deltille::targets::{CharucoSpec, TargetSpec, parse_length_mm};
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Squares in each row, and rows of squares, such as 8x6
+    /// Squares per row and number of rows, such as 8x6
     #[arg(long, value_name = "COLUMNSxROWS")]
     squares: Grid,
-    /// Edge of a square, such as 30mm, 3cm, 1.2in
+    /// Edge length of a square, such as 30mm, 3cm, 1.2in
     #[arg(long, value_name = "LENGTH", default_value = "30mm", value_parser = parse_length_mm)]
     edge: f64,
     /// Side of a marker with its black border [default: three quarters of the square]
     #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm)]
     marker: Option<f64>,
-    /// OpenCV's dictionary: 4x4, 5x5, 6x6 or 7x7 with _50, _100, _250 or _1000; apriltag_16h5,
-    /// apriltag_25h9 or apriltag_36h11
+    /// OpenCV dictionary: 4x4, 5x5, 6x6 or 7x7 with _50, _100, _250 or _1000; apriltag_16h5, apriltag_25h9 or
+    /// apriltag_36h11
     #[arg(long, help_heading = TAGS, value_name = "NAME", default_value = "5x5_100")]
     dictionary: String,
     /// Id of the first marker; the others follow
     #[arg(long, help_heading = TAGS, value_name = "ID", default_value_t = 0,
           allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     first_id: u32,
-    /// The pattern of OpenCV before 4.6, which with an even number of rows begins with a white
-    /// square; in OpenCV setLegacyPattern(true)
+    /// Use the pattern of OpenCV before 4.6, which starts with a white square if the number of rows is even (in
+    /// OpenCV: setLegacyPattern(true))
     #[arg(long)]
     legacy: bool,
     /// Id of the board
@@ -43,12 +43,12 @@ pub struct Args {
     meshes: PlateMeshes,
 }
 
-/// Makes a board, writes its files, and verifies what it wrote.
+/// Creates a board, writes its files, and verifies them.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     args.meshes.check_use(None)?;
     let is_made = args.meshes.is_any();
     let Grid(squares) = args.squares;
-    // A name that is unknown is refused with the other numbers.
+    // An unknown name is rejected later, together with the other settings.
     let name = dictionary(&args.dictionary).map_or(args.dictionary, |(name, _)| name.to_owned());
     let usual = CharucoSpec::new(squares, args.edge, &name);
     let spec = CharucoSpec {

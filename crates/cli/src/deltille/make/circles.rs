@@ -8,17 +8,16 @@ use deltille::targets::{CirclesSpec, TargetSpec, parse_length_mm};
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Circles in each row, and rows, such as 9x7, or 4x11 of an asymmetric grid: OpenCV's
-    /// patternSize
+    /// Circles per row and number of rows, such as 9x7, or 4x11 for an asymmetric grid (OpenCV's patternSize)
     #[arg(long, value_name = "COLUMNSxROWS")]
     circles: Grid,
-    /// Shift every second row: OpenCV's CALIB_CB_ASYMMETRIC_GRID
+    /// Shift every second row (OpenCV's CALIB_CB_ASYMMETRIC_GRID)
     #[arg(long)]
     asymmetric: bool,
-    /// Distance from row to row; along a row too, in an asymmetric grid half of it
+    /// Distance between rows; also the distance along a row, which in an asymmetric grid is twice this spacing
     #[arg(long, value_name = "LENGTH", default_value = "20mm", value_parser = parse_length_mm)]
     spacing: f64,
-    /// Diameter of a circle [default: half of the spacing]
+    /// Diameter of a circle [default: half the spacing]
     #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm)]
     diameter: Option<f64>,
     /// Id of the board
@@ -29,7 +28,7 @@ pub struct Args {
     printing: PrintingArgs,
 }
 
-/// Makes a grid, writes its files, and verifies what it wrote.
+/// Creates a grid, writes its files, and verifies them.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Grid(circles) = args.circles;
     let usual = CirclesSpec::new(circles, args.spacing);

@@ -1,4 +1,4 @@
-//! The end of every command that makes a target: its files are written, reported and verified.
+//! Last step of every command that makes a target: writes, reports and verifies its files.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -16,35 +16,34 @@ use deltille::limits::Limits;
 use deltille::targets::Target;
 use deltille::verify::{Format, whole_of};
 
-/// Schema and version of what `--json` prints.
+/// Schema and version of the output of `--json`.
 const SCHEMA: &str = "deltille/delivery/1";
 
-/// What `--json` prints of a target that was made.
+/// Output of `--json` for a target.
 #[derive(Serialize)]
 struct Delivered<'a> {
     schema: &'static str,
     target: &'a str,
-    /// In words.
+    /// Description in words.
     summary: &'a str,
     /// The files, in the order of writing.
     written: Vec<PathBuf>,
-    /// What came of their proof; nothing where none was made.
+    /// Result of the verification; `None` if it was skipped.
     proof: Option<Proof>,
 }
 
-/// Where the files of a target go, and what is checked before and after.
+/// Options for the output files of a target, and for the checks before and after.
 #[derive(clap::Args)]
 pub struct Delivery {
-    /// Description of another target to be used together with this one: ids that both have are
-    /// refused; may be repeated
+    /// Description of another target to be used together with this one; shared ids are rejected. Repeatable
     #[arg(long, value_name = "FILE")]
     with: Vec<PathBuf>,
-    /// Folder to write to
+    /// Output folder
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
     #[command(flatten)]
     pub overwrite: Overwrite,
-    /// Do not read the written files back to compare them with the description
+    /// Do not read the written files back to verify them
     #[arg(long)]
     no_verify: bool,
     #[command(flatten)]
@@ -54,7 +53,7 @@ pub struct Delivery {
 }
 
 impl Delivery {
-    /// Refuses a target that cannot be used together with those named.
+    /// Rejects a target that cannot be used together with the given ones.
     pub fn check_beside(&self, target: &Target) -> anyhow::Result<()> {
         for path in &self.with {
             let other = target_file::read(path, &self.limits.limits()).context("--with")?;
@@ -63,17 +62,17 @@ impl Delivery {
         Ok(())
     }
 
-    /// Whether a file of that name would be written over another one.
+    /// Whether an output file of this name would replace another file.
     pub fn would_replace(&self, name: &str, other: &Path) -> bool {
         same_file(&self.output.join(name), other)
     }
 
-    /// What is read of a file.
+    /// Returns the input limits.
     pub fn limits(&self) -> Limits {
         self.limits.limits()
     }
 
-    /// Writes all files or none, says so after `summary`, and compares them with the target.
+    /// Writes all files or none, prints `summary` and their paths, and verifies them.
     pub fn deliver(
         &self,
         printing: &Printing,
@@ -90,7 +89,7 @@ impl Delivery {
                 say!("wrote {}", path.display());
             }
         }
-        // A model for a simulator is proved together with the OBJ that it names.
+        // A simulator model is verified together with the OBJ that it uses.
         let models = [Format::Sdf, Format::Urdf, Format::Mjcf].map(Some);
         let is_in_model = written.iter().any(|path| models.contains(&Format::of(path)));
         let artifacts: Vec<PathBuf> = written
@@ -99,7 +98,7 @@ impl Delivery {
             .filter(|path| !(is_in_model && Format::of(path) == Some(Format::Obj)))
             .cloned()
             .collect();
-        // They were just made, however large.
+        // No limits, because the files were just written.
         let prove = || verify::prove(printing, &artifacts, false, self.telling, Limits::NONE);
         let proof = (!self.no_verify && !artifacts.is_empty()).then(prove).transpose()?;
         let code = proof.as_ref().map_or(ExitCode::SUCCESS, Proof::code);
@@ -119,7 +118,7 @@ impl Delivery {
     }
 }
 
-/// Whether a file is compared by itself, and not as a part of another.
+/// Whether a file is verified on its own, and not as a part of another.
 fn is_proved(path: &Path, target: &str) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     Format::of(path).is_some() && whole_of(target, &name).is_none()

@@ -1,14 +1,15 @@
-//! Targets: from what is asked for to files that are compared with their description.
+//! Targets: from options to verified files.
 //!
-//! Comes in: options, or the template of an earlier command. Goes out: the description of a target, what to print, cut or
-//! model, and what the comparison says. A command meets the files in this order:
+//! Input: options, or the template of an earlier command. Output: a target description, files to print, cut or model,
+//! and the result of their verification. The modules, in the order in which a command uses them:
 //!
-//! 1. `plan` proposes the board that suits a camera.
-//! 2. `board`, `solid`, and for other detectors `charuco`, `aprilgrid` and `circles` are the commands that make a target.
-//! 3. `settings` is their settings; `single_panel` the settings of paper of boards for other detectors, and the
-//!    files of their pages.
-//! 4. `delivery` writes the files, tells of them and has them compared.
-//! 5. `verify` compares, at the end of the others or as a command of its own.
+//! 1. `plan` proposes a board that suits a camera.
+//! 2. `board`, `solid`, and for other detectors `charuco`, `aprilgrid` and `circles`, are the commands that make a
+//!    target.
+//! 3. `settings` contains their settings. `single_panel` contains the paper options of boards for other detectors,
+//!    and their page files.
+//! 4. `delivery` writes, reports and verifies the files.
+//! 5. `verify` verifies files, at the end of the other commands or as a command of its own.
 
 pub mod aprilgrid;
 pub mod board;

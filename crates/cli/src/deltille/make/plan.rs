@@ -15,59 +15,60 @@ use deltille::layout::{Proposal, Situation};
 use deltille::targets::{BoardSpec, TagSpec, TagsIn};
 use deltille_core::words::counted;
 
-/// Tilts for which it is told how far a board is labelled, °.
+/// Tilts for which the reading distance is reported, °.
 const TOLD_DEG: [f64; 3] = [0.0, 45.0, 60.0];
 
 /// Arguments of `deltille plan`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Width and height of the camera's pictures, px, such as 1920x1080
+    /// Width and height of the camera's images in px, such as 1920x1080
     #[arg(long, value_name = "WxH", value_parser = size, required_unless_present = "camera")]
     size: Option<[u32; 2]>,
-    /// Its horizontal field of view, ° [default: 60]
+    /// Horizontal field of view of the camera in ° [default: 60]
     #[arg(long, value_name = "DEGREES", value_parser = number(0.1..=150.0), conflicts_with = "camera")]
     fov: Option<f64>,
-    /// The camera, instead: its file
+    /// Camera file, instead of --size and --fov
     #[arg(long, value_name = "FILE", conflicts_with = "size")]
     camera: Option<PathBuf>,
-    /// The distances from which the board is to be seen, such as 50cm..3m
+    /// Range of distances from the camera to the board, such as 50cm..3m
     #[arg(long, value_name = "NEAR..FAR", value_parser = range)]
     distance: [f64; 2],
-    /// Tilt up to which all tags are to be read from the farthest distance, °
+    /// Largest tilt at which all tags must be readable from the farthest distance, °
     #[arg(long, value_name = "DEGREES", default_value = "45", value_parser = number(0.0..=75.0))]
     tilt: f64,
     /// Propose a checkerboard
     #[arg(long)]
     checker: bool,
-    /// Tag family; of a checkerboard without tags where none is given [default: delTag25h7]
+    /// Tag family; checkerboards have no tags unless it is given [default: delTag25h7]
     #[arg(long)]
     family: Option<String>,
-    /// Propose a board of place codes, of which any few tiles are labelled
+    /// Propose a board of position codes, on which any few tiles identify their position
     #[arg(long, conflicts_with_all = ["family", "checker"])]
     dense: bool,
-    /// No tags
+    /// Propose a board without tags
     #[arg(long, conflicts_with_all = ["family", "dense"])]
     untagged: bool,
-    /// The paper that it must fit, such as A3 [default: up to A0]
+    /// Paper that the board must fit, such as A3 [default: up to A0]
     #[arg(long, value_name = "SIZE")]
     paper: Option<String>,
     #[command(flatten)]
     telling: Telling,
 }
 
-/// Width and height, px.
+/// Parses width and height, px.
 fn size(text: &str) -> Result<[u32; 2], String> {
     let sides =
         text.split_once(['x', '×']).and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     let sides =
         sides.filter(|sides: &[u32; 2]| sides.iter().all(|side| (16..=50_000).contains(side)));
-    sides.ok_or_else(|| "write width and height in px, such as 1920x1080".to_owned())
+    sides.ok_or_else(|| "expected width and height in px, such as 1920x1080".to_owned())
 }
 
-/// Two distances, mm; the unit may stand with the second alone.
+/// Parses two distances, mm; the unit may be given only once, at the end.
 fn range(text: &str) -> Result<[f64; 2], String> {
-    let (near, far) =
-        text.split_once("..").ok_or_else(|| "write two distances, such as 50cm..3m".to_owned())?;
+    let (near, far) = text
+        .split_once("..")
+        .ok_or_else(|| "expected two distances, such as 50cm..3m".to_owned())?;
     let unit = far.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
     let with_unit = match near.parse::<f64>() {
         Ok(_) => format!("{near}{unit}"),
@@ -81,15 +82,15 @@ fn range(text: &str) -> Result<[f64; 2], String> {
     }
 }
 
-/// Proposes a board and says what it is good for.
+/// Proposes a board and prints where it can be used.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (focal_px, size_px) = match (&args.camera, args.size) {
         (Some(path), _) => {
             let camera = camera_file::read("--camera", path)?;
             ensure!(
                 camera.lens.is_perspective(),
-                "--camera: a fisheye has no one focal length: give --size and --fov for the part of the picture in which \
-                 the board is to be seen"
+                "--camera: a fisheye has no single focal length; use --size and --fov for the part of the image in \
+                 which the board will appear"
             );
             (camera.focal_px.min_element(), [camera.width, camera.height])
         }
@@ -97,7 +98,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             let half = args.fov.unwrap_or(60.0).to_radians() / 2.0;
             (f64::from(size[0]) / 2.0 / half.tan(), size)
         }
-        (None, None) => bail!("--size: give the size of the pictures, or --camera"),
+        (None, None) => bail!("--size (the image size) or --camera is needed"),
     };
     let situation = Situation {
         focal_px,
@@ -120,7 +121,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(family) = &family {
         ensure!(
             family.kind() == kind,
-            "--family: {} is of the other tiling: take another, or --checker",
+            "--family: {} is for the other tiling; use another family, or --checker",
             family.name()
         );
     }
@@ -168,7 +169,7 @@ fn tell(situation: &Situation, proposal: &Proposal, command: &str) -> anyhow::Re
     let across = 2.0 * (f64::from(width) / 2.0 / focal_px).atan().to_degrees();
     let px_mm = |distance: f64| distance / focal_px;
     say!(
-        "camera: {width} × {height} px, {across:.0}° across; a pixel is {:.2} mm wide at {}, {:.2} mm at {}",
+        "camera: {width} × {height} px, {across:.0}° across; a pixel covers {:.2} mm at {}, {:.2} mm at {}",
         px_mm(near),
         shown(near),
         px_mm(far),
@@ -176,12 +177,12 @@ fn tell(situation: &Situation, proposal: &Proposal, command: &str) -> anyhow::Re
     );
     say!("{command}");
     let whole = match proposal.reach.tags {
-        0 => "; nearer it is not labelled",
-        _ if is_dense(proposal) => "; nearer, any three by four tiles are labelled",
-        _ => "; nearer, parts with a tag in them are labelled",
+        0 => "; nearer, it is not labelled",
+        _ if is_dense(proposal) => "; nearer, any 3 × 4 tiles are labelled",
+        _ => "; nearer, visible parts with a tag are labelled",
     };
     say!(
-        "{}, {}; whole in the picture from {} on{whole}",
+        "{}, {}; fully in the image from {} on{whole}",
         counted(proposal.reach.corners, "corner"),
         counted(proposal.reach.tags, "tag"),
         shown(proposal.whole_from_mm)
@@ -190,27 +191,27 @@ fn tell(situation: &Situation, proposal: &Proposal, command: &str) -> anyhow::Re
         let to = TOLD_DEG.iter().filter_map(|&tilt| {
             let far = shown(to_mm(tilt.to_radians())?);
             Some(match tilt {
-                0.0 => format!("to {far} facing the camera"),
-                _ => format!("to {far} tilted by {tilt:.0}°"),
+                0.0 => format!("up to {far} facing the camera"),
+                _ => format!("up to {far} tilted by {tilt:.0}°"),
             })
         });
         let to: Vec<String> = to.collect();
-        format!("{what} {}, where pictures are sharp", to.join(", "))
+        format!("{what} {}, in sharp images", to.join(", "))
     };
     say!("{}", told("labelled", &|tilt| Some(proposal.reach.labelled_to_mm(focal_px, tilt))));
     if is_dense(proposal) {
         let patches = |tilt| proposal.patches_to_mm(focal_px, tilt);
-        say!("{}", told("three by four tiles of it", &patches));
+        say!("{}", told("3 × 4 tiles of it", &patches));
     }
     Ok(())
 }
 
-/// Whether it is a board of place codes.
+/// Whether the board has position codes.
 fn is_dense(proposal: &Proposal) -> bool {
     proposal.spec.tags.as_ref().is_some_and(TagSpec::is_dense)
 }
 
-/// A distance as a person says it.
+/// Formats a distance in a convenient unit.
 fn shown(mm: f64) -> String {
     match mm {
         ..995.0 => format!("{:.0} cm", mm / 10.0),

@@ -1,4 +1,4 @@
-//! What every target of one panel is told about paper and files.
+//! Paper and file options of all targets with a single panel.
 
 use std::path::PathBuf;
 
@@ -15,24 +15,24 @@ use deltille::family::Family;
 use deltille::layout::{self, DEFAULT_MARGIN_MM, PaperSize, PaperSpec};
 use deltille::targets::{TargetSpec, parse_length_mm};
 
-/// Paper, and files to print.
+/// Options of paper and print files.
 #[derive(clap::Args)]
 pub struct PrintingArgs {
     /// The paper.
     #[arg(long, help_heading = PAPER, value_name = "SIZE", help = format!(
-        "{} [default: the smallest of A4 to A0 that takes the target]", PaperSize::choice()
+        "{} [default: the smallest of A4 to A0 that fits the target]", PaperSize::choice()
     ))]
     paper: Option<String>,
-    /// auto, portrait or landscape
+    /// Page orientation: auto, portrait or landscape
     #[arg(long, help_heading = PAPER, default_value = "auto")]
     orientation: String,
-    /// One page more: a picture of the target, what to do with the sheet, and a ruler
+    /// Add a page with a picture of the target, instructions for the sheet, and a ruler
     #[arg(long, help_heading = PAPER)]
     guide_page: bool,
-    /// Blank along the edges of the paper; 0.5 mm are left in any case [default: 5mm]
+    /// Blank margin along the edges of the paper, at least 0.5 mm [default: 5mm]
     #[arg(long, help_heading = PAPER, value_name = "LENGTH", value_parser = parse_length_mm)]
     margin: Option<f64>,
-    /// Write <name>.pdf; so it is where no other of pdf, svg, png is asked for
+    /// Write <name>.pdf (default unless --svg or --png is given)
     #[arg(long, help_heading = PRINT)]
     pdf: bool,
     /// Write <name>.svg
@@ -44,16 +44,16 @@ pub struct PrintingArgs {
     /// Resolution of the PNG, 200 to 2400 dots per inch [default: 300]
     #[arg(long, help_heading = PRINT, allow_negative_numbers = true, value_parser = whole(DPI))]
     dpi: Option<u32>,
-    /// Printed on the label of every sheet beside the name, such as whose it is
+    /// Text for the label of every sheet, beside the name, such as the owner
     #[arg(long, value_name = "TEXT")]
     note: Option<String>,
-    /// An SVG that is printed black at the other end of the label's strip: filled paths and strokes; white is paper
+    /// SVG logo, printed in black opposite the label: filled paths and strokes; white is paper
     #[arg(long, value_name = "FILE")]
     logo: Option<PathBuf>,
-    /// Height of the logo [default: that of the strip]
+    /// Height of the logo [default: the height of the label strip]
     #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm)]
     logo_height: Option<f64>,
-    /// Stem of the files' names, printed on the sheet [default: that of the command]
+    /// Stem of the file names, also printed on the sheet [default: the name of the command]
     #[arg(long, value_parser = name)]
     name: Option<String>,
     #[command(flatten)]
@@ -65,12 +65,12 @@ pub struct PrintingArgs {
 }
 
 impl PrintingArgs {
-    /// Whether a PDF is written: where nothing else is asked for, too, and no mesh `is_made`.
+    /// Whether a PDF is written: also if no other format is requested and no mesh `is_made`.
     fn is_pdf(&self, is_made: bool) -> bool {
         self.pdf || !(self.svg || self.png || self.laser.is_any() || is_made)
     }
 
-    /// The target on its paper.
+    /// Lays the target out on its paper.
     pub fn build(
         &self,
         command: &str,
@@ -79,7 +79,7 @@ impl PrintingArgs {
         is_made: bool,
     ) -> anyhow::Result<layout::Printing> {
         if self.dpi.is_some() && !self.png {
-            bail!("--dpi: there is no PNG to write: add --png");
+            bail!("--dpi needs --png");
         }
         let paper = PaperSpec {
             size: self.paper.as_deref().map(str::parse).transpose().context("--paper")?,
@@ -103,7 +103,7 @@ impl PrintingArgs {
         Ok(printing)
     }
 
-    /// The description of a target, and its pages; without a PDF that is not asked for where something else `is_made`.
+    /// Returns the description of a target, and its pages; the PDF is omitted by default if a mesh `is_made`.
     pub fn files(&self, printing: &layout::Printing, is_made: bool) -> anyhow::Result<Vec<File>> {
         let formats = Formats { pdf: self.is_pdf(is_made), svg: self.svg, png: self.png };
         let dpi = self.dpi.unwrap_or(DEFAULT_DPI);
@@ -117,19 +117,19 @@ impl PrintingArgs {
     }
 }
 
-/// Refuses what is to be on pages where there are none.
+/// Rejects page options without pages.
 pub fn idle_without_pages(paper: &PaperSpec) -> anyhow::Result<()> {
-    let needed = "--pdf, --svg or --png: add one";
+    let needed = "--pdf, --svg or --png";
     refuse_idle(&[
         ("--guide-page", paper.guide_page, false, needed),
         ("--tag-ids", paper.tag_ids, false, needed),
         ("--note", paper.note.is_some(), false, needed),
         ("--logo", paper.logo.is_some(), false, needed),
-        ("--logo-height", paper.logo_height_mm.is_some(), false, "--logo: add one"),
+        ("--logo-height", paper.logo_height_mm.is_some(), false, "--logo"),
     ])
 }
 
-/// The paper of a target in words.
+/// Describes the paper of a target.
 pub fn page(printing: &layout::Printing) -> String {
     let sheet = printing.sheets.first();
     sheet.map_or_else(String::new, |sheet| {

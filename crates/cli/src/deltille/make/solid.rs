@@ -30,7 +30,7 @@ use deltille_core::quantity::unit_mm;
 pub struct Args {
     #[command(flatten)]
     settings: SolidSettings,
-    /// Take what is not given here from a TOML file
+    /// Read settings that are not given as options from a TOML file
     #[arg(long, value_name = "FILE")]
     template: Option<PathBuf>,
     /// Write the settings as a TOML file
@@ -44,21 +44,21 @@ pub struct Args {
     laser: Laser,
 }
 
-/// Help of options that say something else of a mesh.
+/// Help of options with a different meaning for meshes.
 pub const MEAN_OF_MESH: &str =
-    "Mean of the edges, to which the mesh is scaled, such as 150mm, 15cm, 6in [default: as it is]";
+    "Mean edge length to which the mesh is scaled, such as 150mm, 15cm, 6in [default: unscaled]";
 
-/// Help of options that say something else of solids with square tags.
+/// Help of options with a different meaning for solids with square tags.
 pub mod squares {
     pub const MEAN: &str =
-        "Mean of the three sides, to which the cuboid is scaled [default: as --size says]";
-    pub const TILES: &str = "Squares along each side of a face, 6 to 200, on a cuboid along the shortest; \
-                             all faces have squares of the same size [default: 8]";
+        "Mean of the three sides to which the cuboid is scaled [default: unscaled]";
+    pub const TILES: &str = "Number of squares along each side of a face, 6 to 200; on a cuboid, along the shortest side \
+                             (squares have the same size on all faces) [default: 8]";
     pub const FAMILY: &str = "Tag family: aprilTag36h11, aprilTag25h9 or aprilTag16h5, or a family file \
                               [default: aprilTag36h11]";
-    pub const SPACING: &str = "A tag in every n-th row and column of a face, where the square is black, which with \
-                               an odd n every second is [default: 2]";
-    pub const BORDER: &str = "Black border of a tag, in widths of a bit, at least 1 [default: 2]";
+    pub const SPACING: &str = "Put a tag in every N-th row and column of a face where the square is black, which with \
+                               odd N is every second one [default: 2]";
+    pub const BORDER: &str = "Width of a tag's black border in cells, at least 1 [default: 2]";
 }
 
 /// Arguments of `deltille cuboid`.
@@ -74,22 +74,21 @@ pub struct CuboidArgs {
 /// Arguments of `deltille solid`.
 #[derive(clap::Args)]
 pub struct MeshArgs {
-    /// A closed mesh as OBJ, STL or PLY, in millimetres, whose faces are flat and convex; a board is put on each: deltille
-    /// tiles on triangles, a checkerboard on rectangles, as many deltille tiles as find room on others
+    /// Closed mesh (OBJ, STL or PLY, in millimetres) with flat, convex faces. Each face gets a board: deltille tiles
+    /// on triangles, a checkerboard on rectangles, and as many deltille tiles as fit on others
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
-    /// Family of the square tags, where the mesh has rectangular faces and others [default:
-    /// aprilTag36h11]
+    /// Family of the square tags, if the mesh has both rectangular and other faces [default: aprilTag36h11]
     #[arg(long, help_heading = TAGS, value_name = "FAMILY")]
     square_family: Option<String>,
-    /// Id of the first square tag there [default: 0]
+    /// Id of the first square tag on such a mesh [default: 0]
     #[arg(long, help_heading = TAGS, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     first_square_id: Option<u32>,
     /// Millimetres per unit of the mesh, such as 1000 for metres, 25.4 for inches [default: 1]
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, conflicts_with = "edge",
           value_parser = number(SCALE))]
     scale: Option<f64>,
-    /// Take faces that are far from equilateral, as long as a board fits
+    /// Accept faces that are far from equilateral, as long as a board fits
     #[arg(long)]
     allow_skew: bool,
     #[command(flatten)]
@@ -99,7 +98,7 @@ pub struct MeshArgs {
 /// Range of the millimetres per unit of a mesh.
 const SCALE: RangeInclusive<f64> = unit_mm::RANGE.least..=unit_mm::RANGE.most;
 
-/// Makes a solid whose shape its command tells.
+/// Makes a solid with the shape of its command.
 pub fn run(shape: SolidShape, args: Args) -> anyhow::Result<ExitCode> {
     let command = shape.name();
     let settings = args.settings(command)?;
@@ -111,12 +110,14 @@ pub fn run_cuboid(cuboid: CuboidArgs) -> anyhow::Result<ExitCode> {
     let mut args = cuboid.args;
     args.settings.size = cuboid.size;
     let settings = args.settings("cuboid")?;
-    let Some(size) = &settings.size else { bail!("--size is needed, here or in a --template") };
+    let Some(size) = &settings.size else {
+        bail!("--size is needed, as an option or in a --template")
+    };
     let sides = parse_box_mm(size).context("--size")?;
     run_with(SolidShape::Cuboid(sides), "cuboid", settings, &args)
 }
 
-/// Makes a solid from a mesh, with the stem of its file for a name.
+/// Makes a solid from a mesh, named after the stem of its file by default.
 pub fn run_mesh(mesh: MeshArgs) -> anyhow::Result<ExitCode> {
     let mut args = mesh.args;
     args.settings.mesh = mesh.mesh;
@@ -126,7 +127,7 @@ pub fn run_mesh(mesh: MeshArgs) -> anyhow::Result<ExitCode> {
     args.settings.allow_skew = mesh.allow_skew;
     let mut settings = args.settings("solid")?;
     let Some(path) = settings.mesh.clone() else {
-        bail!("--mesh is needed, here or in a --template")
+        bail!("--mesh is needed, as an option or in a --template")
     };
     let scale = settings.scale.unwrap_or(1.0);
     if !SCALE.contains(&scale) {
@@ -138,7 +139,7 @@ pub fn run_mesh(mesh: MeshArgs) -> anyhow::Result<ExitCode> {
     let (face, deviation) = solid.most_skewed();
     if deviation > NEAR_EQUILATERAL && !settings.allow_skew {
         bail!(
-            "{}: edges of triangle {} deviate by {:.1} % from their mean, more than {:.0} %: give \
+            "{}: edges of triangle {} deviate by {:.1} % from their mean (limit {:.0} %); use \
              --allow-skew to put smaller boards on such faces",
             show(),
             face + 1,
@@ -147,12 +148,12 @@ pub fn run_mesh(mesh: MeshArgs) -> anyhow::Result<ExitCode> {
         );
     }
     if inside_out {
-        say!("{}: its faces look inwards; they were turned", path.display());
+        say!("{}: the faces point inwards; they were flipped", path.display());
     }
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let name = settings.name.clone().unwrap_or_else(|| Name::like(&stem).to_string());
     if settings.meshes.has_obj() && args.delivery.would_replace(&format!("{name}.obj"), &path) {
-        bail!("--name: {name}.obj would be written over the mesh: give another name or folder");
+        bail!("--name: {name}.obj would overwrite the mesh; use another name or folder");
     }
     let faces = solid.faces();
     let vertices: Vec<_> = solid.vertices().iter().map(|&v| v * scale).collect();
@@ -161,7 +162,7 @@ pub fn run_mesh(mesh: MeshArgs) -> anyhow::Result<ExitCode> {
     run_with(SolidShape::Mesh(scaled), "solid", settings, &args)
 }
 
-/// Makes a solid, writes its files, and verifies what it wrote.
+/// Makes a solid, writes its files, and verifies them.
 fn run_with(
     shape: SolidShape,
     command: &str,
@@ -176,7 +177,7 @@ fn run_with(
     let paper = settings.paper()?;
     let family = family_of(&spec)?;
     let name = settings.name.clone().unwrap_or_else(|| spec.shape.name().to_owned());
-    // What is cut is the net that is printed, or would be: the description has it in either case.
+    // The net to cut is the printed one; the description contains it even if it is not printed.
     let net = settings.dxf && !settings.per_face;
     let layout = (settings.printed() || net).then_some(&paper);
     let solid = TargetSpec::Solid(spec.clone());
@@ -199,7 +200,7 @@ fn run_with(
     Ok(delivered)
 }
 
-/// The family of the tags, with that of square ones where there are both.
+/// Returns the family of the tags, with that of square ones if there are both.
 fn family_of(spec: &SolidSpec) -> anyhow::Result<Option<Family>> {
     let Some(tags) = &spec.tags else { return Ok(None) };
     let family = family::resolve(&tags.family).context("--family")?;
@@ -209,7 +210,7 @@ fn family_of(spec: &SolidSpec) -> anyhow::Result<Option<Family>> {
 }
 
 impl Args {
-    /// What is given, and what a template says beyond it.
+    /// Returns the given settings, completed by the template.
     fn settings(&self, command: &str) -> anyhow::Result<SolidSettings> {
         let (meshes, laser) = (self.meshes.clone(), self.laser.clone());
         let given = SolidSettings { meshes, laser, ..self.settings.clone() };
@@ -222,7 +223,7 @@ impl Args {
     }
 }
 
-/// The meshes that are asked for; the glTF where nothing is.
+/// Returns the requested meshes, or the glTF if nothing is requested.
 fn meshes_of(settings: &SolidSettings) -> Meshes {
     let SolidSettings { stl, skeleton, dxf, .. } = *settings;
     let bodies = stl || skeleton || dxf || settings.laser.is_any();
@@ -231,7 +232,7 @@ fn meshes_of(settings: &SolidSettings) -> Meshes {
     if nothing { meshes.with_gltf() } else { meshes }
 }
 
-/// The description, bodies, and files to cut and to list. What can be refused is refused here, before anything is written.
+/// Returns the description, bodies, outlines and lists. Rejects invalid ones before anything is written.
 fn files(
     settings: &SolidSettings,
     printing: &Printing,
@@ -257,7 +258,7 @@ fn files(
     Ok(files)
 }
 
-/// The pages that are asked for.
+/// Returns the requested pages.
 fn pages(settings: &SolidSettings, printing: &Printing) -> anyhow::Result<Vec<File>> {
     if !settings.printed() {
         return Ok(Vec::new());
@@ -268,7 +269,7 @@ fn pages(settings: &SolidSettings, printing: &Printing) -> anyhow::Result<Vec<Fi
     Ok(written::drawn(&printing.target.name, artwork, written::Formats { pdf, svg, png }, dpi))
 }
 
-/// One line on what was made, and one on the panels of a skeleton.
+/// Describes the solid in one line, and the panels of a skeleton in another.
 fn summary(target: &Target, spec: &SolidSpec) -> anyhow::Result<String> {
     let corners: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
     let size = match &spec.shape {
@@ -298,7 +299,7 @@ fn summary(target: &Target, spec: &SolidSpec) -> anyhow::Result<String> {
         let angles: Vec<f64> = angles.collect();
         text += &format!(
             "\nskeleton: panels of {} mm, cut straight {:.2} mm inside the edges; faces meet at \
-             {}°, so that panels without ribs would need edges mitred by {}°",
+             {}°, so panels without ribs would need edges mitred by {}°",
             skeleton.panel_thickness_mm,
             made.panel_inset_mm,
             range(angles.iter().copied(), 2),
@@ -308,7 +309,7 @@ fn summary(target: &Target, spec: &SolidSpec) -> anyhow::Result<String> {
     Ok(text)
 }
 
-/// The least and the greatest of some numbers, or the one that all are.
+/// Formats the smallest and the largest number, or one number if all are equal.
 fn range(numbers: impl Iterator<Item = f64> + Clone, digits: usize) -> String {
     let least = numbers.clone().fold(f64::INFINITY, f64::min);
     let most = numbers.fold(f64::NEG_INFINITY, f64::max);

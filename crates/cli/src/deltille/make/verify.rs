@@ -25,14 +25,14 @@ use deltille_core::words::{counted, shown};
 /// Arguments of `deltille verify`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Description of the target, as `deltille board` writes it
+    /// Target description, as written by `deltille board`
     target: PathBuf,
-    /// Files to verify; without any, all files of the target beside it
+    /// Files to verify [default: all files of the target in the same folder]
     artifacts: Vec<PathBuf>,
-    /// Family of the tags, by name or file; only needed where the target's name for it is not known
+    /// Family of the tags, by name or file; needed only if the family named in the target is unknown
     #[arg(long)]
     family: Option<String>,
-    /// Write all that was measured and found as JSON
+    /// Write all measurements and findings as JSON
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
     #[command(flatten)]
@@ -43,7 +43,7 @@ pub struct Args {
     overwrite: Overwrite,
 }
 
-/// Compares files with the target that they should show.
+/// Verifies files against their target description.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
     let mut printing = target_file::read(&args.target, &limits)?;
@@ -54,7 +54,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let artifacts = match args.artifacts.as_slice() {
         [] => {
             let mut beside = artifacts_beside(folder, &printing);
-            // A description is not proved by itself.
+            // A description cannot verify itself.
             beside.retain(|path| !same_file(path, &args.target));
             beside
         }
@@ -63,7 +63,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if artifacts.is_empty() {
         let name = &printing.target.name;
         bail!(
-            "no {name}.pdf, .svg, .png, .glb, .obj, .sdf, .urdf, .xml, .usda, .3mf, .stl, .dsc or .dxf beside {}: name the files",
+            "no {name}.pdf, .svg, .png, .glb, .obj, .sdf, .urdf, .xml, .usda, .3mf, .stl, .dsc or .dxf found beside {}; list the files to verify",
             args.target.display()
         );
     }
@@ -71,7 +71,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         args.overwrite.check(path, &Kind::of_schema(SCHEMA)).context("--report")?;
         output::check_writable("--report", path)?;
     }
-    interrupt::stands("not all was compared");
+    interrupt::stands("not all files were verified");
     let proof = prove(&printing, &artifacts, alone, args.telling, limits)?;
     if let Some(path) = &args.report {
         let json = serde_json::to_string_pretty(&proof).context("--report")? + "\n";
@@ -84,11 +84,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(proof.code())
 }
 
-/// How often the time that has passed is shown.
+/// Update interval of the elapsed time.
 const TICK: Duration = Duration::from_millis(200);
 
-/// Verifies files, and prints a line on each unless the whole is to be JSON. All pages of a target are among them,
-/// unless one is verified `alone`.
+/// Verifies files, and prints a line for each unless the output is JSON. All pages of a target are among them, unless
+/// one is verified `alone`.
 pub fn prove(
     printing: &Printing,
     artifacts: &[PathBuf],
@@ -120,11 +120,11 @@ pub fn prove(
         match verdict {
             Ok(verdict) => proof.add(verdict, telling)?,
             Err(error) if interrupt::is_raised() => return Err(error.into()),
-            // The others are verified all the same.
+            // The remaining files are still verified.
             Err(error) => {
                 let error = anyhow::Error::from(error);
                 let message = run::message(&error);
-                // A texture that is missing is so for all meshes that show it.
+                // Several meshes may report the same missing texture.
                 if !proof.errors.contains(&message) {
                     run::report(&error);
                     proof.errors.push(message);
@@ -139,7 +139,7 @@ pub fn prove(
     Ok(proof)
 }
 
-/// The artifacts of a target that are in a folder; those that cannot be its own are named.
+/// Returns the artifacts of a target in a folder; reports those that cannot belong to it.
 fn artifacts_beside(folder: &Path, printing: &Printing) -> Vec<PathBuf> {
     let name = &printing.target.name;
     let present = |name: String| Some(folder.join(name)).filter(|path| path.is_file());
@@ -161,8 +161,8 @@ fn artifacts_beside(folder: &Path, printing: &Printing) -> Vec<PathBuf> {
     if printing.sheets.is_empty() {
         for path in printed {
             tell!(
-                "{}: not compared, {name} as described was not laid out on paper: print it anew, \
-                 or remove the file",
+                "{}: not verified, because the description of {name} has no paper layout: print it again, or remove the \
+                 file",
                 path.display()
             );
         }
@@ -170,7 +170,7 @@ fn artifacts_beside(folder: &Path, printing: &Printing) -> Vec<PathBuf> {
     }
     for path in pages_too_many(folder, printing) {
         tell!(
-            "{}: not compared, {name} has {}: remove it, or name it otherwise",
+            "{}: not verified, because {name} has {}: remove or rename the file",
             path.display(),
             counted(count, "page")
         );
@@ -178,7 +178,7 @@ fn artifacts_beside(folder: &Path, printing: &Printing) -> Vec<PathBuf> {
     printed.into_iter().chain(meshes).collect()
 }
 
-/// Files with the names of pages that the target does not have, in order.
+/// Returns files with names of pages that the target does not have, sorted.
 fn pages_too_many(folder: &Path, printing: &Printing) -> Vec<PathBuf> {
     let pages: BTreeSet<String> = ["svg", "png"]
         .into_iter()
@@ -196,7 +196,7 @@ fn pages_too_many(folder: &Path, printing: &Printing) -> Vec<PathBuf> {
             stem.strip_prefix(&*printing.target.name).and_then(|rest| rest.strip_prefix('-'));
         let of_page = number.is_some_and(|number| number.parse::<usize>().is_ok());
         let file = path.file_name().map(|name| name.to_string_lossy().into_owned());
-        // A target may have that name too.
+        // Another target may have that name.
         of_page
             && file.is_some_and(|file| !pages.contains(&file))
             && !path.with_extension("json").is_file()
@@ -209,17 +209,17 @@ fn pages_too_many(folder: &Path, printing: &Printing) -> Vec<PathBuf> {
     found
 }
 
-/// Schema and version of the file of `--report`.
+/// Schema and version of the file written by `--report`.
 const SCHEMA: &str = "deltille/verdict/1";
 
-/// What came of the files of a target.
+/// Results of the files of a target.
 #[derive(Serialize)]
 pub struct Proof {
     schema: &'static str,
     target: String,
     passed: bool,
     artifacts: Vec<Verdict>,
-    /// Files that could not be compared.
+    /// Files that could not be verified.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     errors: Vec<String>,
 }
@@ -239,7 +239,7 @@ impl Proof {
         Ok(())
     }
 
-    /// Prints the sum of it; what could not be compared was told.
+    /// Prints a summary; files that could not be verified have already been reported.
     pub fn tell(&self) -> anyhow::Result<()> {
         let Self { target, artifacts, .. } = self;
         let files = counted(artifacts.len(), "file");
@@ -252,7 +252,7 @@ impl Proof {
         Ok(())
     }
 
-    /// The exit code that says so.
+    /// Returns the exit code.
     pub fn code(&self) -> ExitCode {
         match (self.errors.is_empty(), self.passed) {
             (false, _) => ExitCode::from(run::BAD_INPUT),

@@ -1,4 +1,4 @@
-//! `deltille bench`: how long the stages take on this machine.
+//! `deltille bench`: run time of each stage on this machine.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -24,18 +24,18 @@ pub struct Args {
 
 #[derive(Subcommand)]
 enum Bench {
-    /// Time the stages of detection, on one thread, without the decoding of files
+    /// Time the stages of detection on one thread, without decoding files
     Detect(DetectArgs),
 }
 
 #[derive(clap::Args)]
 struct DetectArgs {
-    /// Photographs, folders of them, patterns, or - for a list on standard input
+    /// Photographs: files, folders, patterns, or - for a list on standard input
     #[arg(required = true, value_name = "IMAGE")]
     images: Vec<PathBuf>,
     #[command(flatten)]
     finder: FinderArgs,
-    /// Detections in each image; the fastest counts, as others were held up by something else
+    /// Number of detections per image, of which the fastest counts; slower runs were disturbed by other processes
     #[arg(long, value_name = "N", default_value_t = 5,
           value_parser = whole(1..=1000u32))]
     repeat: u32,
@@ -45,7 +45,7 @@ struct DetectArgs {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Bench::Detect(args) = args.bench;
     let detector = args.finder.detector()?.1.with_clock(clock::now);
-    // Milliseconds of each stage, one number an image.
+    // Milliseconds of each stage, one number per image.
     let mut stages = BTreeMap::<String, Vec<f64>>::new();
     let mut total = Vec::new();
     let (mut pixels, mut corners) = (0, 0);
@@ -55,7 +55,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let mut best: Option<BTreeMap<String, f64>> = None;
         for _ in 0..args.repeat {
             if interrupt::is_raised() {
-                return Err(Interrupted("nothing was timed to the end".to_owned()).into());
+                return Err(Interrupted("no measurement was completed".to_owned()).into());
             }
             let found = detector.detect(&image, "");
             corners += found.grids.iter().map(|grid| grid.corners.len()).sum::<usize>();
@@ -73,7 +73,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let images = total.len();
     say!(
-        "{images} images, {:.2} Mpx and {:.1} corners each on the average, one thread",
+        "{images} images, {:.2} Mpx and {:.1} corners on average, one thread",
         pixels as f64 / 1e6 / images.max(1) as f64,
         corners as f64 / f64::from(args.repeat) / images.max(1) as f64
     );
@@ -86,7 +86,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Median, 5 % and 95 % quantile; zeros without values.
+/// Returns the median, 5 % and 95 % quantiles; zeros for an empty slice.
 fn quantiles(values: &mut [f64]) -> [f64; 3] {
     [0.5, 0.05, 0.95].map(|part| quantile(values, part).unwrap_or(0.0))
 }

@@ -32,44 +32,43 @@ pub struct Args {
 
 #[derive(Subcommand)]
 enum Experiment {
-    /// Precision of refined corners against blur, noise and tilt, with the Cramér–Rao bound:
-    /// corners.csv, corners.svg and corners.png
+    /// Precision of refined corners against blur, noise and tilt, with the Cramér–Rao bound: corners.csv, corners.svg
+    /// and corners.png
     Corners(CornersArgs),
-    /// Views that are proposed one after the other against views at random: how far calibrations are off, and
-    /// what was expected: guide.csv
+    /// Calibration errors with proposed and with random views, compared with the predicted uncertainty: guide.csv
     Guide(GuideArgs),
-    /// Detection on photographs of a printed page of which everything is known, one thing spoiled at
-    /// a time: photographs.csv, .json, .svg and .png
+    /// Detection on simulated photographs of a printed page with known ground truth, degraded in one way at a time:
+    /// photographs.csv, .json, .svg and .png
     Photographs(PhotographsArgs),
-    /// The paper's §4.4: a rig of four cameras, calibrated with an icosahedron and with a cube whose
-    /// panels are misplaced, with and without refining them: rig.csv
+    /// The paper's §4.4: a rig of four cameras, calibrated with an icosahedron and with a cube with misplaced panels,
+    /// with and without refining them: rig.csv
     Rig(RigArgs),
-    /// Views of a camera in one state, and of one that changes, with a rolling shutter, or with a board of other
-    /// proportions: how often each is diagnosed: states.csv
+    /// How often changes are diagnosed: views of a camera in one state, of a camera that changes, with a rolling
+    /// shutter, and with a board of other proportions: states.csv
     States(StatesArgs),
-    /// The paper's Table 2: calibrate on the first half of a sequence of photographs, find poses
-    /// on the second
+    /// The paper's Table 2: calibrate on the first half of a sequence of photographs, and estimate poses on the
+    /// second
     Table2(Table2Args),
 }
 
 #[derive(clap::Args)]
 struct GuideArgs {
-    /// Views that are proposed
+    /// Number of proposed views
     #[arg(long, value_name = "N", default_value_t = 15, value_parser = whole(4..=100u32))]
     views: u32,
-    /// Views at random
+    /// Number of random views
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = whole(4..=1000u32))]
     random: u32,
-    /// Runs with each of the cameras
+    /// Number of runs with each camera
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = whole(1..=10_000u32))]
     runs: u32,
-    /// Deviation of a coordinate of a corner, px
+    /// Standard deviation of the corner noise per axis, px
     #[arg(long, value_name = "PX", default_value = "0.1", value_parser = noise_px)]
     noise: f64,
-    /// Render every picture and detect its corners instead, with the noise of pixels alone
+    /// Render every image and detect its corners instead, with pixel noise only
     #[arg(long, conflicts_with = "noise")]
     pictures: bool,
-    /// Which cameras [default: all]
+    /// Cameras to simulate [default: all]
     #[arg(long, value_name = "CAMERA", value_delimiter = ',',
           value_parser = ["webcam", "fisheye", "long"])]
     camera: Vec<String>,
@@ -77,10 +76,10 @@ struct GuideArgs {
     simulation: SimulationArgs,
 }
 
-/// A deviation in px at which corners are still told apart.
+/// Parses a standard deviation in px at which corners can still be distinguished.
 fn noise_px(text: &str) -> Result<f64, String> {
     let px: Option<f64> = text.parse().ok().filter(|px| (0.001..=1.0).contains(px));
-    px.ok_or_else(|| "write pixels from 0.001 to 1".to_owned())
+    px.ok_or_else(|| "expected px from 0.001 to 1".to_owned())
 }
 
 #[derive(clap::Args)]
@@ -91,11 +90,11 @@ struct Table2Args {
 
 #[derive(clap::Args)]
 struct RigArgs {
-    /// Width of the pictures, px; 4000 is the paper's
+    /// Width of the images, px; the paper uses 4000
     #[arg(long, value_name = "PX", default_value_t = 1600,
           value_parser = whole(800..=8000u32))]
     width: u32,
-    /// Moments at which pictures are taken; 150 is the paper's
+    /// Number of times at which images are taken; the paper uses 150
     #[arg(long, value_name = "N", default_value_t = 30,
           value_parser = whole(5..=1000u32))]
     frames: u32,
@@ -105,13 +104,13 @@ struct RigArgs {
 
 #[derive(clap::Args)]
 struct StatesArgs {
-    /// Runs without any fault
+    /// Number of runs without a fault
     #[arg(long, value_name = "N", default_value_t = 500, value_parser = whole(1..=100_000u32))]
     clean: u32,
-    /// Runs of each scene with a fault
+    /// Number of runs per scene with a fault
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = whole(1..=100_000u32))]
     runs: u32,
-    /// Which scenes [default: all]
+    /// Scenes to simulate [default: all]
     #[arg(long, value_name = "SCENE", value_delimiter = ',',
           value_parser = Scene::ALL.map(Scene::name))]
     scene: Vec<String>,
@@ -121,11 +120,11 @@ struct StatesArgs {
 
 #[derive(clap::Args)]
 struct CornersArgs {
-    /// Simulated images at every point; each is refined from four starts
+    /// Number of simulated images per point; each is refined from four starting points
     #[arg(long, value_name = "N", default_value_t = 1000,
           value_parser = whole(1..=1_000_000u32))]
     images: u32,
-    /// Tone curve of the simulated camera where it is not varied: linear, srgb, or a gamma such as 2.2
+    /// Tone curve of the simulated camera, unless it is varied: linear, srgb, or a gamma such as 2.2
     #[arg(long, value_name = "CURVE", default_value = "linear")]
     tone: Tone,
     #[command(flatten)]
@@ -134,48 +133,48 @@ struct CornersArgs {
 
 #[derive(clap::Args)]
 struct PhotographsArgs {
-    /// What is varied: blur, motion, noise, jpeg, tone, exposure, contrast, tilt, distance, covers,
-    /// glare, curl, scale, mosaic, sharpening, light, background [default: all]
+    /// Parameters to vary: blur, motion, noise, jpeg, tone, exposure, contrast, tilt, distance, covers, glare, curl,
+    /// scale, mosaic, sharpening, light, background [default: all]
     #[arg(long, value_name = "AXIS", value_delimiter = ',')]
     axis: Vec<Axis>,
-    /// Boards of 20 mm: deltille and checker, with tags; deltille-untagged, checker-untagged; all
+    /// Boards with 20 mm tiles: deltille and checker, with tags; deltille-untagged, checker-untagged; all
     #[arg(long, value_name = "KIND", value_delimiter = ',', default_value = "deltille",
           value_parser = ["deltille", "deltille-untagged", "checker", "checker-untagged", "all"])]
     kind: Vec<String>,
     /// Photograph the first page of this target instead: the .json of `deltille board` …
     #[arg(long, value_name = "FILE", conflicts_with = "kind")]
     target: Option<PathBuf>,
-    /// Family file, where the target names a family that is not shipped
+    /// Family file, if the target uses a family that does not ship with the program
     #[arg(long, requires = "target")]
     family: Option<String>,
-    /// Photographs at each level
+    /// Number of photographs per level
     #[arg(long, value_name = "N", default_value_t = 6,
           value_parser = whole(1..=10_000u32))]
     views: u32,
-    /// Write all pictures with their truth to this folder
+    /// Write all images with their ground truth to this folder
     #[arg(long, value_name = "FOLDER")]
     images: Option<PathBuf>,
     #[command(flatten)]
     simulation: SimulationArgs,
 }
 
-/// What every simulation takes.
+/// Options of every simulation.
 #[derive(clap::Args)]
 struct SimulationArgs {
-    /// Seed of all random choices
+    /// Seed of the random number generator
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Threads [default: one per processor]
+    /// Number of threads [default: one per processor]
     #[arg(short, value_name = "N", value_parser = whole(1..=1024u16))]
     jobs: Option<u16>,
-    /// Folder for the results
+    /// Output folder
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
     #[command(flatten)]
     overwrite: Overwrite,
 }
 
-/// Runs an experiment; nothing is written when it is interrupted.
+/// Runs an experiment; nothing is written if it is interrupted.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     interrupt::stands("no result was written");
     match args.experiment {
@@ -195,7 +194,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 impl SimulationArgs {
-    /// Runs a simulation, which is handed what counts its steps on a bar.
+    /// Runs a simulation with a callback that advances a progress bar.
     fn run<T: Send>(
         &self,
         steps: usize,
@@ -268,7 +267,7 @@ fn run_states(args: StatesArgs) -> anyhow::Result<ExitCode> {
 fn run_corners(args: CornersArgs) -> anyhow::Result<ExitCode> {
     let CornersArgs { images, tone, simulation } = args;
     if tone == Tone::Auto {
-        bail!("--tone: a simulated camera has a curve that is known: linear, srgb or a gamma");
+        bail!("--tone: a simulated camera needs a known curve: linear, srgb or a gamma");
     }
     let SimulationArgs { seed, output: folder, .. } = &simulation;
     let interrupted = interrupt::flag();
@@ -280,7 +279,7 @@ fn run_corners(args: CornersArgs) -> anyhow::Result<ExitCode> {
     };
     let svg = plot::svg(&rows);
     let png = plot::png(&svg).context("the plot cannot be drawn")?;
-    say!("{} fits a point, seed {seed}", 4 * images);
+    say!("{} fits per point, seed {seed}", 4 * images);
     let files = [
         text_file("corners.csv".to_owned(), corners::csv(&rows)),
         text_file("corners.svg".to_owned(), svg),
@@ -336,7 +335,7 @@ fn run_photographs(args: PhotographsArgs) -> anyhow::Result<ExitCode> {
 }
 
 impl PhotographsArgs {
-    /// What is photographed.
+    /// Returns the targets to photograph.
     fn subjects(&self) -> anyhow::Result<Vec<Subject>> {
         if let Some(path) = &self.target {
             let mut printing = target_file::read(path, &Limits::default())?;

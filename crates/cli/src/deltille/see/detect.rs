@@ -29,81 +29,81 @@ use deltille_core::words::{counted, shown};
 /// Arguments of `deltille detect`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Photographs (PNG, JPEG, TIFF, BMP, PGM or WebP), folders of them, patterns such as
-    /// 'day*/*.png', or - for a list on standard input, a path a line
+    /// Photographs (PNG, JPEG, TIFF, BMP, PGM or WebP): files, folders, patterns such as 'day*/*.png', or - for a
+    /// list on standard input, one path per line
     #[arg(required = true, value_name = "IMAGE")]
     images: Vec<PathBuf>,
     #[command(flatten)]
     finder: FinderArgs,
-    /// Folder for the results, named after the images [default: this folder]
+    /// Output folder; result files are named after the images [default: current folder]
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
-    /// What to write; several may be given, separated by commas
+    /// Output formats, separated by commas
     #[arg(long, value_delimiter = ',', default_value = "json", value_parser = format(DETECTION_FORMATS))]
     format: Vec<&'static DetectionFormat>,
-    /// Write <image>.overlay.png too: corners, grid and ids drawn over the photograph
+    /// Also write <image>.overlay.png: corners, grid and ids drawn over the photograph
     #[arg(long)]
     overlay: bool,
-    /// Write into the JSON how long each stage took, ms; without, two runs write the same
+    /// Include the run time of each stage in the JSON, ms (makes the output differ between runs)
     #[arg(long)]
     timing: bool,
-    /// Print each result on standard output as a line of JSON as soon as it is there; files are
-    /// written only where -o names a folder. Ink is then estimated from each image by itself, not from all, so that
-    /// corners differ slightly from those of a run without --stream; a known --ink gives the same
+    /// Print each result as a line of JSON on standard output as soon as it is available; files are written only if
+    /// -o is given. The ink spread is then estimated from each image separately, so corners differ slightly from
+    /// those of a run without --stream, unless --ink is known
     #[arg(long)]
     stream: bool,
-    /// Read JPEG files of which a part is missing too, and note it in the result; without this they are errors
+    /// Accept incomplete JPEG files and note the damage in the result; otherwise they are errors
     #[arg(long)]
     accept_damaged: bool,
-    /// Leave out images whose results are there already, as after a stopped run
+    /// Skip images that already have results (resume an interrupted run)
     #[arg(long, conflicts_with = "stream")]
     skip_existing: bool,
     #[command(flatten)]
     overwrite: Overwrite,
-    /// Images at a time [default: one per processor]
+    /// Number of images processed in parallel [default: one per processor]
     #[arg(short, value_name = "N", value_parser = whole(1..=1024u16))]
     jobs: Option<u16>,
 }
 
-/// What came of an image.
+/// Outcome of an image.
 enum Outcome {
     Seen(Box<Found>),
     Skipped,
 }
 
-/// What was found in an image.
+/// Detections in an image.
 struct Found {
-    /// The line to print of it.
+    /// The line to print.
     line: String,
-    /// What it says of the ink.
+    /// The ink spread estimated from the image.
     ink: Option<InkEstimate>,
-    /// Whether what was asked for is there: labels of the target, or some grid.
+    /// Whether the requested target or grid was found.
     is_there: bool,
-    /// Its row, where tables are written.
+    /// The table row, if tables are written.
     row: Option<Picture>,
 }
 
-/// An image that was looked at.
+/// A processed image.
 struct Seen {
-    /// Its place among all.
+    /// Index among all images.
     index: usize,
     image: PathBuf,
-    /// Of its results.
+    /// Stem of its result files.
     stem: String,
     ink: Option<InkEstimate>,
 }
 
-/// Detects in all images; an image that cannot be read is reported, and the rest go on.
+/// Detects targets in all images. Images that cannot be read are reported, and the others are processed.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (targets, detector) = args.finder.detector()?;
     let of_one = args.format.iter().find(|format| format.is_of_one_target);
     if let Some(format) = of_one.filter(|_| targets.len() > 1) {
         let name = format.name();
-        bail!("--format {name}: it has no names of targets: give one --target at a time");
+        bail!("--format {name} does not support several targets; use one --target at a time");
     }
     let detector = if args.timing { detector.with_clock(clock::now) } else { detector };
     let images = Images::of(&args.images)?;
-    // Clashes among images that are named are found before any work is done.
+    // Detects name clashes among the named images before the work starts.
     let mut named = Stems::default();
     for image in images.named() {
         args.check_results(&named.claim(image)?)?;
@@ -135,23 +135,23 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         .collect();
     let tables = folder.map(|folder| Tables::begin(folder, &targets)).transpose()?;
     if tables.is_some() {
-        // Rows that are there are kept.
+        // Existing rows are kept.
         interrupt::keeps_results();
     }
 
     let bar = progress::bar(images.count().unwrap_or(0) as u64, "images");
     let threads = rayon::ThreadPoolBuilder::new().num_threads(args.jobs.unwrap_or(0).into());
-    // One after the other, so that it is always the later one of two with one stem that is refused.
+    // Sequential, so that of two images with the same stem the later one is always rejected.
     let mut stems = Stems::default();
     let claimed = images.iter().map(|image| {
         let image = image?;
         stems.claim(&image)?;
         Ok(image)
     });
-    let go_on = if args.stream { "" } else { "; --skip-existing goes on from here" };
+    let go_on = if args.stream { "" } else { "; resume with --skip-existing" };
     let report = Report::new(images.count() == Some(1), go_on);
     let seen: Mutex<Vec<Seen>> = Mutex::default();
-    // Rows of images that are not seen, if they have one.
+    // Rows of images that were not processed, if they have one.
     let unseen: Mutex<Vec<(usize, Option<Picture>)>> = Mutex::default();
     let threads = threads.build()?;
     images_at_once::for_each(&threads, &limits, claimed, |index, image| {
@@ -185,7 +185,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     });
     bar.finish_and_clear();
     let mut seen = seen.into_inner().expect("no thread panics here");
-    // In the order of the images, whichever was done first.
+    // Sorted by image order, independent of the order of completion.
     seen.sort_unstable_by_key(|seen| seen.index);
     let mut again = None;
     if args.stream {
@@ -196,7 +196,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     if let Some(tables) = tables {
         let is_left = interrupt::is_raised();
-        // An interrupted run does not take the place of one that was not, unless it goes on with it.
+        // An interrupted run does not replace a complete one, unless it resumes it.
         let stays = is_left && !args.skip_existing && folder.is_some_and(detection_tables::are_in);
         match again.filter(|_| !is_left) {
             _ if stays => {}
@@ -205,7 +205,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
     }
     if let Some(folder) = new_folder {
-        // This removes only an empty folder.
+        // Removes the folder only if it is empty.
         let _ = fs::remove_dir(folder);
     }
     if interrupt::is_raised() {
@@ -214,20 +214,20 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     report.end()
 }
 
-/// Says, after each image was printed with its own ink, that all together have one by which corners are others.
+/// Notes that each image used its own ink estimate, and that the joint estimate gives different corners.
 fn tell_ink_of_all(detector: &Detector, seen: &[Seen]) {
     let found: Vec<Option<InkEstimate>> = seen.iter().map(|seen| seen.ink).collect();
     if let Some(ink) = detector.ink_of_all(&found) {
         let images = counted(ink.pictures as usize, "image");
         tell!(
-            "note: --stream located the corners of each image with the ink of that image; without it they are located \
-             with the ink of all, {ink} ({images}), and differ"
+            "note: --stream used a separate ink estimate for each image; without it, corners are located with the \
+             joint estimate, {ink} ({images}), and differ slightly"
         );
     }
 }
 
-/// Looks once more at all images, with what they say together of the ink: pictures that say little of it are seen
-/// with what all say. Tables are then written anew, with the rows of images that were not seen.
+/// Processes all images a second time with the joint ink estimate, because a single image may constrain the ink
+/// poorly. Rewrites the tables, with the rows of images that were not processed.
 fn see_again(
     args: &Args,
     targets: &[Target],
@@ -242,7 +242,7 @@ fn see_again(
     let Some(ink) = InkEstimate::of_all(&known).filter(|ink| ink.used) else { return Ok(None) };
     let mut tables = None;
     if let Some(detector) = detector.with_ink_of(&found) {
-        let bar = progress::bar(seen.len() as u64, "images, with the ink of all");
+        let bar = progress::bar(seen.len() as u64, "images, second pass with joint ink estimate");
         let images = seen.iter().map(|seen| Ok(seen.image.clone()));
         tables = args.tables().map(|folder| Tables::begin(folder, targets)).transpose()?;
         if let Some(table) = &tables {
@@ -268,16 +268,16 @@ fn see_again(
         });
         bar.finish_and_clear();
     }
-    tell!("ink: {ink} ({})", counted(ink.pictures as usize, "picture"));
+    tell!("ink: {ink} ({})", counted(ink.pictures as usize, "image"));
     Ok(tables)
 }
 
-/// The name of an image in its results.
+/// Returns the name of an image in its results.
 fn name_of(image: &Path) -> String {
     image.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// The row of an image in tables, if it has one.
+/// Returns the table row of an image, if it has one.
 fn row_of(name: Option<String>, result: &mut anyhow::Result<Outcome>) -> Option<Picture> {
     match result {
         Ok(Outcome::Seen(found)) => found.row.take(),
@@ -286,11 +286,11 @@ fn row_of(name: Option<String>, result: &mut anyhow::Result<Outcome>) -> Option<
     }
 }
 
-/// Prints what came of the images, in their order, as soon as it is known.
+/// Prints the results of the images in order, as soon as they are available.
 struct Report {
-    /// A single image's error is the command's.
+    /// With a single image, its error is the error of the command.
     single: bool,
-    /// What to say of going on after an interruption.
+    /// How to resume after an interruption.
     go_on: &'static str,
     state: Mutex<State>,
 }
@@ -312,9 +312,9 @@ impl Report {
         report
     }
 
-    /// How things stand.
+    /// Describes the progress so far.
     fn standing(&self) -> String {
-        format!("{} images are done{}", self.done(), self.go_on)
+        format!("{} images done{}", self.done(), self.go_on)
     }
 
     fn add(&self, index: usize, result: anyhow::Result<Outcome>) {
@@ -333,7 +333,7 @@ impl Report {
                 Ok(Outcome::Skipped) => state.skipped += 1,
                 Ok(Outcome::Seen(found)) => {
                     state.found += usize::from(found.is_there);
-                    // What cannot be printed is lost, as it would be with `println`.
+                    // Output that cannot be printed is lost, as with `println`.
                     if let Err(error) = output::print(&found.line) {
                         state.error.get_or_insert(error);
                     }
@@ -350,7 +350,7 @@ impl Report {
         }
     }
 
-    /// Counts an image that was seen, and cannot be seen or written once more.
+    /// Counts an image that failed in the second pass.
     fn fail_again(&self, error: &anyhow::Error) {
         run::report(error);
         self.state.lock().expect("no thread panics here").failed += 1;
@@ -368,7 +368,7 @@ impl Report {
             return Err(error);
         }
         if skipped > 0 {
-            tell!("{skipped} of {all} images skipped: their results are there");
+            tell!("{skipped} of {all} images skipped, because they already have results");
         }
         if failed == 0 {
             let nothing = found == 0 && skipped == 0;
@@ -380,7 +380,7 @@ impl Report {
 }
 
 impl Args {
-    /// Where results go; none with `--stream` alone.
+    /// Returns the output folder; `None` with `--stream` alone.
     fn folder(&self) -> Option<&Path> {
         match &self.output {
             Some(folder) => Some(folder),
@@ -389,17 +389,17 @@ impl Args {
         }
     }
 
-    /// The folder of tables, where they are asked for.
+    /// Returns the folder of tables, if requested.
     fn tables(&self) -> Option<&Path> {
         self.folder().filter(|_| !self.format.iter().all(|format| format.is_of_one_image()))
     }
 
-    /// Formats with a file for each image that are asked for.
+    /// Iterates over the requested formats with one file per image.
     fn each(&self) -> impl Iterator<Item = &'static DetectionFormat> + '_ {
         self.format.iter().copied().filter(|format| format.is_of_one_image())
     }
 
-    /// The files of an image's results.
+    /// Returns the result files of an image.
     fn results(&self, stem: &str) -> Vec<(PathBuf, Kind)> {
         let Some(folder) = self.folder() else { return Vec::new() };
         let formats = self.each().map(|format| (format.name(), format.kind()));
@@ -408,15 +408,14 @@ impl Args {
         all.map(|(end, kind)| (folder.join(format!("{stem}.{end}")), kind)).collect()
     }
 
-    /// A result may not take the place of a target, of the truth of a synthetic picture, or of
-    /// anything else.
+    /// Refuses to replace a target, the ground truth of a synthetic image, or any other file.
     fn check_results(&self, stem: &str) -> anyhow::Result<()> {
         let mut results = self.results(stem).into_iter();
         results.try_for_each(|(path, kind)| self.overwrite.check(&path, &kind))
     }
 }
 
-/// Detects in one image, writes its results, and says what was found.
+/// Detects targets in one image, writes its results, and describes them.
 fn one_image(
     args: &Args,
     targets: &[Target],
@@ -450,7 +449,7 @@ fn one_image(
     Ok(Found { line, ink: found.ink, is_there, row })
 }
 
-/// What was found in an image, in a line, and why there is no more.
+/// Describes the detections in an image in one line, and why there are not more.
 fn summary(path: &Path, found: &Detection) -> String {
     let corners: usize = found.grids.iter().map(|grid| grid.corners.len()).sum();
     let tags: usize = found.grids.iter().map(|grid| grid.tags.len()).sum();
@@ -475,7 +474,7 @@ fn summary(path: &Path, found: &Detection) -> String {
     }
     let mut lines = vec![line];
     if let Some(damage) = &found.file.damage {
-        let grey = "pixels that it does not have are grey";
+        let grey = "missing pixels are grey";
         lines.push(format!("  the file is damaged ({damage}): {grey}"));
     }
     lines.extend(found.reasons.iter().map(|reason| format!("  {reason}")));

@@ -1,4 +1,4 @@
-//! What to look for, and how: the options that `detect` and `bench detect` share.
+//! Detector options shared by `detect` and `bench detect`.
 
 use std::path::PathBuf;
 
@@ -14,40 +14,40 @@ use deltille::lattice::GridKind;
 use deltille::limits::Limits;
 use deltille::targets::{SIDES, Target};
 
-/// Options that say what to look for.
+/// Options that select the target and the method.
 #[derive(clap::Args)]
 pub struct FinderArgs {
-    /// Description of the target: the .json of `deltille board`, or a .dsc; may be given for each of several targets
+    /// Target description: the .json of `deltille board`, or a .dsc; repeatable for several targets
     #[arg(long, value_name = "FILE", conflicts_with = "grid")]
     pub target: Vec<PathBuf>,
-    /// Find untagged boards of this tiling instead
+    /// Detect untagged boards of this tiling instead
     #[arg(long, value_name = "KIND")]
     grid: Option<Kind>,
-    /// Rows of corners of the untagged board: labels boards seen whole from their lower left, on a
-    /// checkerboard the corner whose square is dark
+    /// Number of corner rows of the untagged board; labels fully visible boards from their lower left corner, on a
+    /// checkerboard from the corner with the dark square
     #[arg(long, conflicts_with = "target", requires = "cols", value_parser = whole(SIDES))]
     rows: Option<u32>,
-    /// Corners in each row of the untagged board
+    /// Number of corners per row of the untagged board
     #[arg(long, conflicts_with = "target", requires = "rows", value_parser = whole(SIDES))]
     cols: Option<u32>,
-    /// Family file, where the target names a family that is not shipped
+    /// Family file, if the target uses a family that does not ship with the program
     #[arg(long, conflicts_with = "grid")]
     family: Option<String>,
-    /// Most bits of a tag that may be corrected [default: ⌊(h−1)/2⌋ of its family]
+    /// Largest number of corrected bits per tag [default: ⌊(h−1)/2⌋ of its family]
     #[arg(long, value_name = "BITS", conflicts_with = "grid", value_parser = whole(0..=u32::MAX))]
     max_errors: Option<u32>,
-    /// Label boards that are seen as in a mirror too
+    /// Also label mirror images of boards
     #[arg(long)]
     allow_mirrored: bool,
-    /// How corners are refined
+    /// Corner refinement method
     #[arg(long, value_name = "METHOD", default_value = "model")]
     refine: Method,
-    /// The camera's tone curve: linear, srgb, a gamma such as 2.2, or auto: estimated from the corners of
-    /// each picture
+    /// Tone curve of the camera: linear, srgb, a gamma such as 2.2, or auto (estimated from the corners of each
+    /// image)
     #[arg(long, value_name = "CURVE", default_value = "auto")]
     tone: Tone,
-    /// How far ink has spread on the print, on every side of what is dark: µm, none, or auto: estimated from
-    /// the corners of each picture
+    /// Ink spread of the print, outward from every dark edge: µm, none, or auto (estimated from the corners of each
+    /// image)
     #[arg(long, value_name = "UM", default_value = "auto", allow_negative_numbers = true)]
     ink: Ink,
     #[command(flatten)]
@@ -63,18 +63,18 @@ enum Kind {
 }
 
 impl FinderArgs {
-    /// What is read of a file.
+    /// Returns the input limits.
     pub fn limits(&self) -> Limits {
         self.limits.limits()
     }
 
-    /// The targets that are named, and the detector.
+    /// Returns the given targets, and the detector.
     pub fn detector(&self) -> anyhow::Result<(Vec<Target>, Detector)> {
         if self.target.is_empty() && self.grid.is_none() {
-            bail!("give --target FILE, or --grid deltille or checker for untagged boards");
+            bail!("--target FILE is needed, or --grid deltille or checker for untagged boards");
         }
         if self.allow_mirrored && self.target.is_empty() && self.rows.is_none() {
-            bail!("--allow-mirrored needs labels: give --target FILE, or --rows and --cols");
+            bail!("--allow-mirrored needs --target FILE, or --rows and --cols, to label corners");
         }
         let config = DetectorConfig::default()
             .max_bit_errors(self.max_errors)
@@ -84,7 +84,9 @@ impl FinderArgs {
             .ink(self.ink);
         if self.target.is_empty() {
             if matches!(self.ink, Ink::Um(um) if um != 0.0) {
-                bail!("--ink: µm need the size of the tiles: give --target FILE, or --ink none");
+                bail!(
+                    "--ink in µm needs --target FILE for the size of the tiles; otherwise use --ink none"
+                );
             }
             let kind = match self.grid {
                 Some(Kind::Checker) => GridKind::Checker,
@@ -100,7 +102,7 @@ impl FinderArgs {
             let Some(family) = target.family()? else { continue };
             if let Some(limit) = self.max_errors.filter(|limit| *limit > family.correctable()) {
                 bail!(
-                    "--max-errors: {limit} is more than the {} bits that {} can correct",
+                    "--max-errors: {limit} exceeds the {} bits that {} can correct",
                     family.correctable(),
                     family.name()
                 );

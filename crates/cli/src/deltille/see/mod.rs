@@ -1,11 +1,11 @@
-//! Pictures: from photographs to labelled corners.
+//! Detection: from photographs to labelled corners.
 //!
-//! Comes in: photographs, and the targets in them. Goes out: files of detections, in the formats that other programs read.
+//! Input: photographs, and their targets. Output: detection files, in formats that other programs read.
 //!
-//! 1. `render` takes a synthetic photograph of a target, for which all is known that the others find.
-//! 2. `detector_options` says what to look for, and how.
-//! 3. `detect` finds it in many photographs at once and writes what it found.
-//! 4. `refine` only refines corners whose places another program found.
+//! 1. `render` renders a synthetic photograph of a target with full ground truth.
+//! 2. `detector_options` selects targets and methods.
+//! 3. `detect` detects targets in many photographs in parallel, and writes the results.
+//! 4. `refine` only refines corners that another program detected.
 
 pub mod detect;
 pub mod detector_options;

@@ -17,7 +17,7 @@ use deltille::limits::Limits;
 use deltille::photograph;
 use deltille::raster::AnyGray;
 
-/// Corners that are refined at a time: as many as of one picture.
+/// Largest number of corners to refine, about as many as in one image.
 const MOST_SEEDS: usize = 20_000;
 
 /// Arguments of `deltille refine`.
@@ -26,23 +26,23 @@ pub struct Args {
     /// Photograph: PNG, JPEG, TIFF, BMP, PGM or WebP
     #[arg(value_name = "IMAGE")]
     image: PathBuf,
-    /// What meets at the corners
+    /// Tiling around the corners
     #[arg(long)]
     kind: Kind,
-    /// Starts, `x,y` per line in px, pixel centres at integers; a header line is skipped
+    /// Initial corner positions, `x,y` per line in px, with pixel centres at integers; a header line is skipped
     #[arg(long, value_name = "FILE")]
     seeds: PathBuf,
-    /// How to refine
+    /// Refinement method
     #[arg(long, default_value = "model")]
     method: Method,
-    /// Side of the square of pixels that may be read, an odd number; the polynomial's window is
-    /// the largest 4r + 1 within it
+    /// Side of the square window of pixels that may be read (odd); the polynomial method uses the largest 4r + 1 that
+    /// fits
     #[arg(long, value_name = "PIXELS", default_value_t = 21, value_parser = window)]
     window: usize,
-    /// The camera's tone curve: linear, srgb, a gamma such as 2.2, or auto: estimated from all these corners
+    /// Tone curve of the camera: linear, srgb, a gamma such as 2.2, or auto (estimated from all these corners)
     #[arg(long, value_name = "CURVE", default_value = "auto")]
     tone: Tone,
-    /// File for the results [default: standard output]
+    /// Output file [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     #[command(flatten)]
@@ -51,12 +51,12 @@ pub struct Args {
     overwrite: Overwrite,
 }
 
-/// How corners are refined.
+/// Corner refinement method.
 #[derive(Clone, Copy, ValueEnum)]
 pub enum Method {
-    /// The paper's fit of a cubic (deltille) or quadric (checker); no covariances
+    /// Fit of a cubic (deltille) or quadric (checker), as in the paper; no covariances
     Polynomial,
-    /// A blurred corner fitted to the pixels, with covariances
+    /// Fit of a blurred corner model to the pixels, with covariances
     Model,
 }
 
@@ -71,9 +71,9 @@ impl From<Method> for Refinement {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Kind {
-    /// Six triangles
+    /// Six triangles meet at a corner
     Deltille,
-    /// Four squares
+    /// Four squares meet at a corner
     Checker,
 }
 
@@ -81,10 +81,10 @@ fn window(text: &str) -> Result<usize, String> {
     text.parse()
         .ok()
         .filter(|side| side % 2 == 1 && (9..=MAX_WINDOW_PX).contains(side))
-        .ok_or_else(|| format!("an odd number from 9 to {MAX_WINDOW_PX} is needed"))
+        .ok_or_else(|| format!("expected an odd number from 9 to {MAX_WINDOW_PX}"))
 }
 
-/// Refines all seeds; a seed that no corner is near is reported in its line, not as an error.
+/// Refines all seeds; a seed without a corner nearby is reported in its line, not as an error.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
     let seeds = read_seeds(&args.seeds, &limits).context("--seeds")?;
@@ -105,7 +105,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The results as CSV; covariances in px², empty where the method gives none.
+/// Formats the results as CSV; covariances in px², empty if the method provides none.
 fn table(refined: &[Refined]) -> String {
     let mut text = "x,y,cov_xx,cov_xy,cov_yy,status\n".to_owned();
     for Refined { position: DVec2 { x, y }, cov, status, .. } in refined {
@@ -126,7 +126,11 @@ fn read_seeds(path: &Path, limits: &Limits) -> anyhow::Result<Vec<DVec2>> {
     let seeds = csv::read_points(&text);
     let seeds = seeds.map_err(|problem| anyhow!("{}: {problem}", path.display()))?;
     if seeds.len() > MOST_SEEDS {
-        bail!("{}: {} points; at most {MOST_SEEDS} at a time", path.display(), seeds.len());
+        bail!(
+            "{}: {} points, but at most {MOST_SEEDS} can be refined at a time",
+            path.display(),
+            seeds.len()
+        );
     }
     Ok(seeds)
 }

@@ -21,25 +21,25 @@ use deltille_core::quantity::{Range, blur_px, light_gradient, of_full_scale, pla
 /// Arguments of `deltille render`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Description of the target: the .json of `deltille board` or `deltille icosahedron`
+    /// Target description: the .json of `deltille board` or `deltille icosahedron`
     target: PathBuf,
-    /// The camera: a YAML file with width, height, focal_px, centre_px, model (pinhole, fisheye)
-    /// and distortion, or the camera file of ROS or OpenCV
+    /// Camera: a YAML file with width, height, focal_px, centre_px, model (pinhole, fisheye) and distortion, or a
+    /// camera file of ROS or OpenCV
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
-    /// Pose of the target in the camera frame (x right, y down, z forward): rotation vector in
-    /// radians and translation in mm
+    /// Pose of the target in the camera frame (x right, y down, z forward): rotation vector in radians and
+    /// translation in mm
     #[arg(long, value_name = "RX,RY,RZ,TX,TY,TZ", value_parser = numbers::<6>,
           allow_hyphen_values = true, conflicts_with = "eye")]
     pose: Option<[f64; 6]>,
-    /// Where the camera stands in the target frame, mm, instead of --pose
+    /// Position of the camera in the target frame in mm, instead of --pose
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true)]
     eye: Option<[f64; 3]>,
-    /// What --eye looks at, mm [default: the middle of all corners]
+    /// Point that the camera at --eye looks at, mm [default: the middle of all corners]
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true,
           requires = "eye")]
     look_at: Option<[f64; 3]>,
-    /// What is up in the picture of --eye [default: 0,0,1, or 0,1,0 from straight above or below]
+    /// Up direction of the image with --eye [default: 0,0,1, or 0,1,0 from straight above or below]
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true,
           requires = "eye")]
     up: Option<[f64; 3]>,
@@ -51,21 +51,21 @@ pub struct Args {
     #[arg(long, default_value_t = 1.0, value_name = "PERCENT", allow_negative_numbers = true,
           value_parser = number(0.0..=100.0 * of_full_scale::RANGE.most))]
     noise: f64,
-    /// Relative change of the light across and down the picture
+    /// Relative change of the brightness across and down the image
     #[arg(long, value_name = "ACROSS,DOWN", value_parser = gradient,
           allow_hyphen_values = true, default_value = "0,0")]
     gradient: [f64; 2],
     /// Seed of the noise
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Bits of a pixel: 8 or 16
+    /// Bits per pixel: 8 or 16
     #[arg(long, default_value_t = 8, value_parser = depth)]
     bits: u8,
-    /// Family file, where the target names a family that is not shipped
+    /// Family file, if the target uses a family that does not ship with the program
     #[arg(long)]
     family: Option<String>,
-    /// The picture, a .png file, or a folder for <target>-view.png; the true positions of all
-    /// corners in it are written beside it as .json
+    /// Output image, a .png file or a folder for <target>-view.png; the true positions of all visible corners are
+    /// written beside it as .json
     #[arg(short, long, value_name = "FILE", default_value = ".")]
     output: PathBuf,
     #[command(flatten)]
@@ -74,18 +74,21 @@ pub struct Args {
     overwrite: Overwrite,
 }
 
-/// Takes a picture of a target and writes it with its truth.
+/// Renders an image of a target, and writes it with its ground truth.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
     let mut target = target_file::read(&args.target, &limits)?.target;
     target_file::set_family(&mut target, args.family.as_deref())?;
     if !target.is_one_scene() {
-        bail!("{} has several loose boards: render targets of one board, or solids", target.name);
+        bail!(
+            "{} has several loose boards; only solids and single boards can be rendered",
+            target.name
+        );
     }
     let camera = camera_file::read("--camera", &args.camera)?;
     limits.check_pixels(camera.width, camera.height).with_context(|| {
         let file = args.camera.display();
-        format!("--camera: {file}: a picture of {} × {} px", camera.width, camera.height)
+        format!("--camera: {file}: an image of {} × {} px", camera.width, camera.height)
     })?;
     let light = Light::default()
         .blur_px(args.blur)
@@ -107,26 +110,26 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         _ => picture(&camera, image.pixels().iter().map(|v| (v * 65535.0 + 0.5) as u16)),
     };
     let mut png = std::io::Cursor::new(Vec::new());
-    picture.context("the picture is empty")?.write_to(&mut png, image::ImageFormat::Png)?;
+    picture.context("the image is empty")?.write_to(&mut png, image::ImageFormat::Png)?;
     let truth_name = Path::new(&*name).with_extension("json").to_string_lossy().into_owned();
     let files =
         [text_file(truth_name, truth), bytes_file(name.into_owned(), signed_png(png.into_inner()))];
     write_all(output::folder_of(&path), &files, args.overwrite)?;
     say!("{}: {} corners in view", path.display(), seen.len());
     if seen.is_empty() {
-        // In the frames of OpenCV's boards z points into the board.
+        // In the frames of OpenCV's boards, z points into the board.
         let first = target.panels.first();
         let is_away = first.is_some_and(|panel| panel.pose.matrix().z_axis.z < 0.0);
         let side = if is_away { "z < 0" } else { "z > 0" };
         tell!(
-            "warning: the camera looks past the target, or at its back: with --eye it looks at the \
-             middle of the target, whose front is on the side of {side} where it is a board"
+            "warning: the target is behind the camera, out of view, or seen from its back: --eye looks at the \
+             middle of the target, and a board faces the side of {side}"
         );
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// The picture of a camera; `None` where it has other than so many pixels.
+/// Creates the image of a camera; `None` if the number of pixels differs.
 fn picture<T>(camera: &Camera, pixels: impl Iterator<Item = T>) -> Option<DynamicImage>
 where
     T: image::Primitive,
@@ -136,10 +139,10 @@ where
     ImageBuffer::from_raw(camera.width, camera.height, pixels.collect()).map(DynamicImage::from)
 }
 
-/// Reads the depth of a picture.
+/// Parses the bit depth of an image.
 fn depth(text: &str) -> Result<u8, String> {
     let bits = text.parse().ok().filter(|bits| [8, 16].contains(bits));
-    bits.ok_or_else(|| "not 8 or 16".to_owned())
+    bits.ok_or_else(|| "expected 8 or 16".to_owned())
 }
 
 impl Args {
@@ -149,27 +152,31 @@ impl Args {
             return Ok(Pose { rotation, translation: DVec3::from_slice(&pose[3..]) });
         }
         let Some(eye) = self.eye.map(DVec3::from) else {
-            bail!("give --pose, or --eye for where the camera stands");
+            bail!("--pose or --eye (the camera position) is needed");
         };
         let centre = self.look_at.map(DVec3::from).unwrap_or(middle);
         let pose = Pose::viewing(eye, centre, self.up.map(DVec3::from));
-        pose.context("--up: it must not be parallel to the line of sight, nor --eye be --look-at")
+        pose.context(
+            "--up must not be parallel to the line of sight, and --eye must differ from --look-at",
+        )
     }
 }
 
-/// So many numbers of a size that places have, separated by commas.
+/// Parses N comma-separated coordinates within the range of positions.
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     numbers_of(place_mm::RANGE, text)
 }
 
-/// A relative change of the light across and down a picture.
+/// Parses a relative change of the brightness across and down an image.
 fn gradient(text: &str) -> Result<[f64; 2], String> {
     numbers_of(light_gradient::RANGE, text)
 }
 
-/// So many numbers of a range, separated by commas.
+/// Parses N comma-separated numbers within a range.
 fn numbers_of<const N: usize>(range: Range, text: &str) -> Result<[f64; N], String> {
     let parsed = text.split(',').map(|word| range.parse(word));
     let numbers = parsed.collect::<Result<Vec<f64>, _>>()?;
-    numbers.try_into().map_err(|v: Vec<f64>| format!("{} numbers instead of {N}", v.len()))
+    numbers
+        .try_into()
+        .map_err(|v: Vec<f64>| format!("expected {N} numbers, but there are {}", v.len()))
 }

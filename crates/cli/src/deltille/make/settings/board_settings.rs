@@ -1,5 +1,4 @@
-//! What `deltille board` and `deltille checkerboard` are told: the same settings as options and as a
-//! TOML template.
+//! Settings of `deltille board` and `deltille checkerboard`, both as options and as a TOML template.
 
 #![allow(rustdoc::invalid_html_tags)] // The comments on options are the help of the program, too.
 
@@ -23,17 +22,17 @@ use deltille::targets::{BORDER_BITS, BoardSpec, MOST_ROWS, SIDES, TagSpec, TagsI
 /// Resolution of PNG files, dots per inch.
 pub const DEFAULT_DPI: u32 = 300;
 
-/// Range of the resolution: in a coarser picture a check bar cannot be measured to 0.02 mm.
+/// Range of the resolution; in a coarser image, a check bar cannot be measured to 0.02 mm.
 pub const DPI: RangeInclusive<u32> = 200..=2400;
 
-/// Heading of the help of boards and solids: tags.
+/// Help heading of boards and solids: tags.
 pub const TAGS: &str = "Tags";
-/// Likewise: paper.
+/// Help heading: paper.
 pub const PAPER: &str = "Paper";
-/// Likewise: what is printed or listed.
-pub const PRINT: &str = "Files to print, and lists";
+/// Help heading: files to print and lists.
+pub const PRINT: &str = "Print files and corner lists";
 
-/// Settings as they are given; what is not given has a default.
+/// Settings as given; those that are not given have defaults.
 #[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct BoardSettings {
@@ -41,91 +40,92 @@ pub struct BoardSettings {
     #[arg(skip)]
     #[serde(skip_serializing_if = "Option::is_none")]
     command: Option<String>,
-    /// Rows of corners, 2 to 500
+    /// Number of corner rows, 2 to 500
     #[arg(long, allow_negative_numbers = true, value_parser = whole(SIDES))]
     rows: Option<u32>,
-    /// Corners in each row, 2 to 500
+    /// Number of corners per row, 2 to 500
     #[arg(long, allow_negative_numbers = true, value_parser = whole(SIDES))]
     cols: Option<u32>,
-    /// Edge of a tile, such as 20mm, 2cm, 0.8in [default: 20mm, or the largest in whole
-    /// millimetres that fits --paper]
+    /// Edge length of a tile, such as 20mm, 2cm, 0.8in [default: 20mm, or the largest whole number of millimetres
+    /// that fits --paper]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     edge: Option<String>,
-    /// Tag family: on a board a name from `deltag list`, or a family file [default: delTag25h7]; on a
-    /// checkerboard aprilTag36h11, aprilTag25h9 or aprilTag16h5 [default: no tags]
+    /// Tag family: on a board, a name from `deltag list` or a family file [default: delTag25h7]; on a checkerboard,
+    /// aprilTag36h11, aprilTag25h9 or aprilTag16h5 [default: no tags]
     #[arg(long, help_heading = TAGS)]
     #[serde(alias = "tags")]
     family: Option<String>,
-    /// Squares of a checkerboard that carry the tags: black, the square itself being the border, or
-    /// white, each tag with a border of its own, for detectors that know single tags only
-    /// [default: black]
+    /// Squares of a checkerboard that contain the tags: black (the square itself is the border) or white (each tag
+    /// has its own border, for detectors of single tags) [default: black]
     #[arg(long, help_heading = TAGS, value_name = "COLOUR", value_parser = colour)]
     tags_in: Option<TagsIn>,
-    /// A small place code in every upright tile: any few tiles beside each other tell where they are on a deltille board,
-    /// and on which of 255
+    /// Put a small position code in every upright tile: any few adjacent tiles identify their position on a deltille
+    /// board, and which of 255 boards it is
     #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tag_spacing", "first_id", "untagged"])]
     #[serde(skip_serializing_if = "is_false")]
     dense: bool,
-    /// No tags
+    /// Make a board without tags
     #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tags_in", "tag_spacing", "tag_border", "hole", "first_id"])]
     #[serde(skip_serializing_if = "is_false")]
     untagged: bool,
-    /// A tag in every n-th row and column, on a checkerboard where the square has the right colour,
-    /// which with an odd n every second has [default: 3, on a checkerboard 2]
+    /// Put a tag in every N-th row and column; on a checkerboard where the square has the right colour, which with
+    /// odd N is every second one [default: 3; 2 on a checkerboard]
     #[arg(long, help_heading = TAGS, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
     tag_spacing: Option<u32>,
-    /// Black border of a tag, in widths of a bit, 0.6 to 10, on a checkerboard at least 1
-    /// [default: 1.5, in black squares 2, in white ones 1]
+    /// Width of a tag's black border in cells, 0.6 to 10, at least 1 on a checkerboard [default: 1.5; 2 in black
+    /// squares, 1 in white ones]
     #[arg(long, help_heading = TAGS, value_name = "BITS", allow_negative_numbers = true, value_parser = number(BORDER_BITS))]
     tag_border: Option<f64>,
-    /// A hole in the middle of each triangular tag, for a screw or a camera, of a family made with `deltag gen-family --free centre`
+    /// Diameter of a hole in the middle of each triangular tag, for a screw or a camera; needs a family made with
+    /// `deltag gen-family --free centre`
     #[arg(long, help_heading = TAGS, value_name = "DIAMETER", allow_hyphen_values = true)]
     hole: Option<String>,
     /// Id of the first tag; the others follow [default: 0]
     #[arg(long, help_heading = TAGS, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     first_id: Option<u32>,
-    /// The id of each tag beside it, in small type
+    /// Print the id of each tag beside it in small type
     #[arg(long, help_heading = TAGS)]
     #[serde(skip_serializing_if = "is_false")]
     tag_ids: bool,
     /// Id of the first board [default: 0]
     #[arg(long, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     board_id: Option<u32>,
-    /// Number of boards, alike but for their ids, each on its own sheet, or with --pack several on one [default: 1]
+    /// Number of boards, identical except for their ids; each on its own sheet, or several per sheet with --pack
+    /// [default: 1]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
     boards: Option<u32>,
-    /// White tiles on black: black and white exchanged
+    /// Exchange black and white: white tiles on black
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     invert: bool,
-    /// A board on the back of its plate, too, on a second sheet: so far apart are the two sides, such as
-    /// 3mm
+    /// Also print a board for the back of the plate, on a second sheet; the value is the distance between the two
+    /// sides, such as 3mm
     #[arg(long, value_name = "THICKNESS", allow_hyphen_values = true)]
     two_sided: Option<String>,
     /// The paper.
     #[arg(long, help_heading = PAPER, value_name = "SIZE", help = format!(
-        "{} [default: the smallest of A4 to A0 that takes the board]", PaperSize::choice()
+        "{} [default: the smallest of A4 to A0 that fits the board]", PaperSize::choice()
     ))]
     paper: Option<String>,
-    /// Print a board that is larger than the paper over several pages, to be joined
+    /// Print a board larger than the paper on several pages, to be joined
     #[arg(long, help_heading = PAPER)]
     #[serde(skip_serializing_if = "is_false")]
     poster: bool,
-    /// As many boards on each sheet as fit, to be cut apart, each with a label of its own
+    /// Put as many boards on each sheet as fit, each with its own label, to be cut apart
     #[arg(long, help_heading = PAPER, conflicts_with = "poster")]
     #[serde(skip_serializing_if = "is_false")]
     pack: bool,
-    /// One page more: a picture of the board, what to do with the sheets, and a ruler
+    /// Add a page with a picture of the board, instructions for the sheets, and a ruler
     #[arg(long, help_heading = PAPER)]
     #[serde(skip_serializing_if = "is_false")]
     guide_page: bool,
-    /// auto, portrait or landscape [default: auto]
+    /// Page orientation: auto, portrait or landscape [default: auto]
     #[arg(long, help_heading = PAPER)]
     orientation: Option<String>,
-    /// Blank along the edges of the paper; 0.5 mm are left in any case [default: 5mm]
+    /// Blank margin along the edges of the paper, at least 0.5 mm [default: 5mm]
     #[arg(long, help_heading = PAPER, value_name = "LENGTH", allow_hyphen_values = true)]
     margin: Option<String>,
-    /// Write <name>.pdf; so it is where no other of pdf, svg, png is asked for
+    /// Write <name>.pdf (default unless --svg or --png is given)
     #[arg(long, help_heading = PRINT)]
     #[serde(skip_serializing_if = "is_false")]
     pdf: bool,
@@ -141,28 +141,28 @@ pub struct BoardSettings {
     #[arg(long, help_heading = PRINT)]
     #[serde(skip_serializing_if = "is_false")]
     dsc: bool,
-    /// fork or original [default: fork]
+    /// Dialect of the .dsc: fork or original [default: fork]
     #[arg(long, help_heading = PRINT, value_name = "DIALECT")]
     dsc_dialect: Option<String>,
     /// Resolution of the PNG, 200 to 2400 dots per inch [default: 300]
     #[arg(long, help_heading = PRINT, allow_negative_numbers = true, value_parser = whole(DPI))]
     dpi: Option<u32>,
-    /// Printed on the label of every sheet beside the name, such as whose it is
+    /// Text for the label of every sheet, beside the name, such as the owner
     #[arg(long, value_name = "TEXT")]
     note: Option<String>,
-    /// An SVG that is printed black at the other end of the label's strip: filled paths and strokes; white is paper
+    /// SVG logo, printed in black opposite the label: filled paths and strokes; white is paper
     #[arg(long, value_name = "FILE")]
     logo: Option<String>,
-    /// Height of the logo [default: that of the strip]
+    /// Height of the logo [default: the height of the label strip]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     logo_height: Option<String>,
-    /// Stem of the files' names, printed on the sheet [default: board, or checkerboard]
+    /// Stem of the file names, also printed on the sheet [default: board or checkerboard]
     #[arg(long)]
     name: Option<String>,
-    /// Thickness of the plate in a mesh, which [`PlateMeshes`] asks for.
+    /// Thickness of the plate in a mesh, parsed by [`PlateMeshes`].
     #[arg(skip)]
     plate: Option<String>,
-    /// Meshes, which it asks for, too.
+    /// Meshes, also parsed by it.
     #[arg(skip)]
     #[serde(skip_serializing_if = "is_usual")]
     meshes: Meshes,
@@ -170,44 +170,44 @@ pub struct BoardSettings {
     #[arg(skip)]
     #[serde(skip_serializing_if = "is_usual")]
     pub laser: Laser,
-    /// How it is finished.
+    /// Finishing.
     #[arg(skip)]
     #[serde(skip_serializing_if = "is_usual")]
     pub finishing: Finishing,
 }
 
-/// Reads the colour of the squares that carry tags.
+/// Parses the colour of the squares that contain tags.
 fn colour(text: &str) -> Result<TagsIn, String> {
     match text {
         "black" => Ok(TagsIn::Black),
         "white" => Ok(TagsIn::White),
-        _ => Err("write black or white".to_owned()),
+        _ => Err("expected black or white".to_owned()),
     }
 }
 
-/// What is said of tags and not of place codes.
+/// Options that apply to tags, but not to position codes.
 const NOT_DENSE: [&str; 4] = ["--family", "--hole", "--tag-spacing", "--first-id"];
 
-/// Refuses what is said of tags that there are not: a template may say what the parser of options would refuse, and options
-/// what does not replace all that it says.
+/// Rejects tag options without tags. Templates may contain combinations that the option parser would reject, and
+/// options do not replace everything in a template.
 pub fn check_tags(untagged: bool, dense: bool, of_tags: &[(&str, bool)]) -> anyhow::Result<()> {
     let mut given = of_tags.iter().filter(|(_, given)| *given).map(|(option, _)| option);
     if untagged && let Some(option) = given.next() {
-        bail!("--untagged: there are no tags: leave it or {option} out");
+        bail!("--untagged conflicts with {option}; remove one of them");
     }
     if dense && let Some(option) = given.find(|option| NOT_DENSE.contains(option)) {
-        bail!("--dense: there are place codes and no other tags: leave it or {option} out");
+        bail!("--dense conflicts with {option} (position codes replace tags); remove one of them");
     }
     Ok(())
 }
 
-/// Settings understood.
+/// Parsed settings.
 pub struct Plan {
-    /// Stem of the files' names.
+    /// Stem of the file names.
     pub name: String,
     /// The board.
     pub spec: BoardSpec,
-    /// What it is printed on.
+    /// The paper.
     pub paper: PaperSpec,
     /// Whether a PDF of all pages is written.
     pub pdf: bool,
@@ -215,24 +215,24 @@ pub struct Plan {
     pub svg: bool,
     /// Whether a PNG of each page is written.
     pub png: bool,
-    /// Whose list of corners and tags is written, if any.
+    /// Dialect of the list of corners and tags, if it is written.
     pub dsc: Option<Dialect>,
     /// Resolution of the PNG, dots per inch.
     pub dpi: u32,
 }
 
 impl BoardSettings {
-    /// Reads a template of boards of a kind.
+    /// Reads a template for boards of this kind.
     pub fn read(path: &Path, grid: GridKind) -> anyhow::Result<Self> {
         template::read(path, command(grid), |settings: &Self| settings.command.as_deref())
     }
 
-    /// The text of a template.
+    /// Returns the text of a template.
     pub fn to_toml(&self, grid: GridKind) -> String {
         template::text(&Self { command: Some(command(grid).to_owned()), ..self.clone() })
     }
 
-    /// These settings, and those of a template where these say nothing.
+    /// Returns these settings, completed by those of a template.
     pub fn or(self, template: Self) -> Self {
         let (bare, dense) = (self.untagged, self.dense);
         let tagged = self.of_tags().into_iter().any(|(_, given)| given);
@@ -240,7 +240,7 @@ impl BoardSettings {
         let two_sided = self.two_sided.is_some();
         let png = self.png || (template.png && !formats);
         let dsc = self.dsc || template.dsc;
-        // Which tags there are, is said as a whole: what an option says of it replaces what else a template says.
+        // Tag settings are replaced as a whole: an option also overrides conflicting settings of the template.
         Self {
             command: None,
             rows: self.rows.or(template.rows),
@@ -270,13 +270,13 @@ impl BoardSettings {
             png,
             dsc,
             dsc_dialect: self.dsc_dialect.or(template.dsc_dialect),
-            // Of no use where other formats are asked for than in the template.
+            // Unused if the options select other formats than the template.
             dpi: self.dpi.or(template.dpi.filter(|_| png || !template.png)),
             note: self.note.or(template.note),
             logo: self.logo.or(template.logo),
             logo_height: self.logo_height.or(template.logo_height),
             name: self.name.or(template.name),
-            // Of two sides the distance is the thickness.
+            // The distance between two sides is the thickness of the plate.
             plate: self.plate.or(template.plate.filter(|_| !two_sided)),
             meshes: self.meshes.or(template.meshes),
             laser: self.laser.or(template.laser),
@@ -284,26 +284,26 @@ impl BoardSettings {
         }
     }
 
-    /// The meshes of its plate that are asked for.
+    /// Returns the requested meshes of the plate.
     pub fn meshes(&self) -> PlateMeshes {
         PlateMeshes { meshes: self.meshes.clone(), plate: self.plate.clone() }
     }
 
-    /// These settings, with what is not printed.
+    /// Returns these settings with those of meshes, laser drawings and finishing.
     pub fn with(self, meshes: PlateMeshes, laser: Laser, finishing: Finishing) -> Self {
         let PlateMeshes { meshes, plate } = meshes;
         Self { plate, meshes, laser, finishing, ..self }
     }
 
-    /// Whether a format to print is asked for.
+    /// Whether a print format is requested.
     pub fn prints(&self) -> bool {
         self.pdf || self.svg || self.png
     }
 
-    /// Understands the settings; numbers that no board has are left to its making.
+    /// Parses the settings; numeric ranges are checked when the board is made.
     pub fn plan(&self, grid: GridKind) -> anyhow::Result<Plan> {
         let (Some(rows), Some(cols)) = (self.rows, self.cols) else {
-            bail!("--rows and --cols are needed, here or in a --template");
+            bail!("--rows and --cols are needed, as options or in a --template");
         };
         let paper = PaperSpec {
             size: self.paper.as_deref().map(str::parse).transpose().context("--paper")?,
@@ -322,10 +322,12 @@ impl BoardSettings {
         let height = length("logo-height", &self.logo_height)?;
         let paper = logo::on(paper, self.logo.as_deref(), height)?;
         if grid == GridKind::Deltille && self.tags_in.is_some() {
-            bail!("--tags-in: the tags of a deltille board are in its black tiles: leave it out");
+            bail!(
+                "--tags-in has no effect, because tags of a deltille board are always in its black tiles; remove it"
+            );
         }
         if grid == GridKind::Checker && self.dense {
-            bail!("--dense: place codes are for triangles: take `deltille board`");
+            bail!("--dense: position codes need triangular tiles; use `deltille board`");
         }
         let of_tags = self.of_tags();
         check_tags(self.untagged, self.dense, &of_tags)?;
@@ -336,7 +338,7 @@ impl BoardSettings {
             && self.family.is_none()
             && let Some((option, _)) = of_tags.iter().find(|(_, given)| *given)
         {
-            bail!("{option}: there are no tags: name their family with --tags");
+            bail!("{option} needs tags: set their family with --tags");
         }
         let hole_mm = length("hole", &self.hole)?;
         let tags = tagged.then(|| TagSpec {
@@ -362,10 +364,10 @@ impl BoardSettings {
             None => usual_edge_mm(&spec, &paper),
         };
         if self.dsc_dialect.is_some() && !self.dsc {
-            bail!("--dsc-dialect: there is no .dsc to write: add --dsc");
+            bail!("--dsc-dialect needs --dsc");
         }
         if self.dpi.is_some() && !self.png {
-            bail!("--dpi: there is no PNG to write: add --png");
+            bail!("--dpi needs --png");
         }
         let dialect = match &self.dsc_dialect {
             Some(text) => {
@@ -389,7 +391,7 @@ impl BoardSettings {
         })
     }
 
-    /// The options that say something of tags, and whether they are given.
+    /// Returns the tag options, and whether each is given.
     fn of_tags(&self) -> [(&'static str, bool); 7] {
         [
             ("--family", self.family.is_some()),
@@ -402,13 +404,13 @@ impl BoardSettings {
         ]
     }
 
-    /// The same with the edge that was chosen, so that a template gives the same board again.
+    /// Returns the settings with the chosen edge length, so that a template gives the same board again.
     pub fn with_edge(self, edge_mm: f64) -> Self {
         Self { edge: Some(format!("{edge_mm}mm")), ..self }
     }
 }
 
-/// The command that makes boards of this kind, and the name of those that have none.
+/// Returns the command that makes boards of this kind, which is also their default name.
 fn command(grid: GridKind) -> &'static str {
     match grid {
         GridKind::Deltille => "board",

@@ -1,4 +1,4 @@
-//! Options of boards that are not plain prints: mirror images, spot colours, drawings for a laser.
+//! Finishing options of boards: mirror images, spot colours, laser drawings.
 
 #![allow(rustdoc::invalid_html_tags)] // The comments on options are the help of the program, too.
 
@@ -12,24 +12,23 @@ use deltille::export::artifacts::{MakeError, Making, What, make};
 use deltille::layout::{Finish, Printing};
 
 /// Heading of these options.
-const FINISHING: &str = "Glass, print shops, lasers";
+const FINISHING: &str = "Finishing: glass, print shops, lasers";
 
 /// How a board is finished.
 #[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 #[command(next_help_heading = FINISHING)]
 pub struct Finishing {
-    /// Print the mirror image, for the back of glass: the description, and labels, are what is seen through the
-    /// glass
+    /// Print the mirror image, for the back of glass; the description and labels match the view through the glass
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     mirrored: bool,
-    /// A white spot colour of that name, such as White or RDG_WHITE, beneath all of each page of the PDF, and
-    /// everything overprints
+    /// Print white under each page of the PDF in a spot colour of this name, such as White or RDG_WHITE, with
+    /// everything else overprinted
     #[arg(long, value_name = "NAME")]
     white: Option<String>,
-    /// A line to cut along in the middle of the margin, in the PDF in a spot colour of that name, such as CutContour;
-    /// with --pack the lines between boards
+    /// Draw a cut line in the middle of the margin, in the PDF in a spot colour of this name, such as CutContour;
+    /// with --pack, between boards
     #[arg(long, value_name = "NAME")]
     contour: Option<String>,
 }
@@ -39,18 +38,18 @@ pub struct Finishing {
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 #[command(next_help_heading = FINISHING)]
 pub struct Laser {
-    /// Write <name>-laser.dxf or <name>-laser.svg: what is black as closed outlines to engrave, and the outline of
-    /// each plate to cut (millimetres)
+    /// Write <name>-laser.dxf or <name>-laser.svg: closed outlines of black areas to engrave, and the outline of each
+    /// plate to cut (millimetres)
     #[arg(long, value_name = "FORMATS", value_delimiter = ',')]
     #[serde(rename = "formats", skip_serializing_if = "Vec::is_empty")]
     laser: Vec<LaserFormat>,
-    /// Width that the beam takes away: engraved outlines are drawn smaller by half of it on each side, plates larger
-    /// [default: 0mm]
+    /// Width of the material removed by the beam; engraved outlines shrink, and plates grow, by half of it on each
+    /// side [default: 0mm]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     kerf: Option<String>,
 }
 
-/// Format of a drawing for a laser.
+/// Format of a laser drawing.
 #[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum LaserFormat {
@@ -59,7 +58,7 @@ enum LaserFormat {
 }
 
 impl Finishing {
-    /// This finish, and what a template says of it where it says nothing; its spot colours where a PDF `is_kept`.
+    /// Returns this finish, completed by a template; spot colours of the template only if a PDF `is_kept`.
     pub fn or(self, template: Self, is_kept: bool) -> Self {
         Self {
             mirrored: self.mirrored || template.mirrored,
@@ -68,7 +67,7 @@ impl Finishing {
         }
     }
 
-    /// The target with this finish, which is laid out within this margin.
+    /// Applies this finish to a target that is laid out with this margin.
     pub fn applied(
         &self,
         printing: Printing,
@@ -78,11 +77,11 @@ impl Finishing {
     ) -> anyhow::Result<Printing> {
         laser.check_use()?;
         if self.mirrored && printing.sheets.is_empty() && !laser.is_any() {
-            bail!("--mirrored: a mesh is never mirrored: add --pdf or --laser, or leave it out");
+            bail!("--mirrored does not apply to meshes: add --pdf or --laser, or remove it");
         }
         let spots = [("--white", self.white.is_some()), ("--contour", self.contour.is_some())];
         if let Some((option, _)) = spots.into_iter().find(|(_, given)| *given && !pdf) {
-            bail!("{option}: only a PDF has spot colours: add --pdf, or leave it out");
+            bail!("{option} needs --pdf, because only PDF supports spot colours");
         }
         let (white, contour) = (self.white.clone(), self.contour.clone());
         let finish = Finish { mirrored: self.mirrored, white, contour };
@@ -91,24 +90,24 @@ impl Finishing {
 }
 
 impl Laser {
-    /// These drawings, and what a template says of them where these say nothing.
+    /// Returns these drawings, completed by those of a template.
     pub fn or(self, template: Self) -> Self {
         let laser = if self.laser.is_empty() { template.laser } else { self.laser };
         Self { laser, kerf: self.kerf.or(template.kerf) }
     }
 
-    /// Whether any is asked for.
+    /// Whether any drawing is requested.
     pub fn is_any(&self) -> bool {
         !self.laser.is_empty()
     }
 
-    /// Refuses a kerf of nothing.
+    /// Rejects a kerf without a drawing.
     pub fn check_use(&self) -> anyhow::Result<()> {
-        let needed = "a drawing for a laser: add --laser";
+        let needed = "--laser";
         refuse_idle(&[("--kerf", self.kerf.is_some(), self.is_any(), needed)])
     }
 
-    /// The drawings that are asked for.
+    /// Returns the requested drawings.
     pub fn files(&self, printing: &Printing) -> anyhow::Result<Vec<File>> {
         let mut making = Making::default();
         making.kerf_mm = length("kerf", &self.kerf)?.unwrap_or(0.0);

@@ -1,4 +1,4 @@
-//! The logo that is asked for.
+//! The logo option.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use deltille::layout::PaperSpec;
 use deltille::limits;
 use deltille::logo::{self, LogoError, MAX_LOGO_BYTES};
 
-/// A paper with the logo of a file, so high.
+/// Adds the logo in a file, with this height, to a paper.
 pub fn on(
     paper: PaperSpec,
     file: Option<impl AsRef<Path>>,

@@ -1,4 +1,4 @@
-//! Options of all commands that make meshes, and the files of these.
+//! Mesh options of all commands that make targets, and the mesh files.
 
 #![allow(rustdoc::invalid_html_tags)] // The comments on options are the help of the program, too.
 
@@ -19,71 +19,70 @@ use deltille::export::threemf;
 use deltille::targets::{Target, TargetSpec};
 
 /// Heading of these options.
-const MESHES: &str = "Meshes and models for simulators";
+const MESHES: &str = "Meshes and simulator models";
 
-/// Sides of a texture, px.
+/// Range of the longest side of a texture, px.
 const SIDE_PX: RangeInclusive<u32> = 64..=MAX_TEXTURE_PX;
 
-/// Resolution of a texture, dots per inch.
+/// Range of the resolution of a texture, dots per inch.
 const TEXTURE_DPI: RangeInclusive<f64> = 1.0..=1e5;
 
-/// Which meshes are written.
+/// Requested meshes.
 #[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 #[command(next_help_heading = MESHES)]
 pub struct Meshes {
-    /// Write <name>.glb, the textured mesh as glTF 2.0 (metres); of a solid also where nothing else
-    /// is asked for
+    /// Write <name>.glb, the textured mesh as glTF 2.0 (metres); default for solids if no other file is requested
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     gltf: bool,
-    /// Write <name>.obj, <name>.mtl and <name>-texture.png (millimetres), of several textures
-    /// <name>-texture-1.png and so on
+    /// Write <name>.obj, <name>.mtl and <name>-texture.png (millimetres); with several textures, <name>-texture-1.png
+    /// and so on
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     obj: bool,
-    /// Write <name>.sdf, a static model for Gazebo, with the files of --obj
+    /// Write <name>.sdf, a static model for Gazebo, and the files of --obj
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     sdf: bool,
-    /// Write <name>.urdf, a link for ROS, with the files of --obj
+    /// Write <name>.urdf, a link for ROS, and the files of --obj
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     urdf: bool,
-    /// Write <name>.xml, a body for MuJoCo, with the files of --obj, and of several textures
-    /// <name>-1.obj and so on
+    /// Write <name>.xml, a body for MuJoCo, and the files of --obj; with several textures, <name>-1.obj and so on
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     mjcf: bool,
-    /// Write <name>.usda, for Isaac Sim, Omniverse or Blender, with its texture (metres)
+    /// Write <name>.usda with its texture (metres), for Isaac Sim, Omniverse or Blender
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     usd: bool,
-    /// Write <name>.3mf to print in two colours: two bodies, what is black inlaid into the white
-    /// plate or solid (millimetres); of a solid with --skeleton that frame, too
+    /// Write <name>.3mf for printing in two colours: the white plate or solid, and a second body for the black areas,
+    /// inlaid into it (millimetres); with --skeleton, also that frame
     #[arg(long = "3mf")]
     #[serde(rename = "3mf", skip_serializing_if = "is_false")]
     threemf: bool,
-    /// Depth of what is black in a 3MF, less than the plate is thick, or than where faces meet [default: 0.4mm]
+    /// Depth of the black inlay in a 3MF; less than the plate's thickness, or than the distance to where faces meet
+    /// [default: 0.4mm]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     inlay: Option<String>,
-    /// Longest side of the texture, px; at least 4 px are needed for a bit of a tag, of a
-    /// checkerboard 12 [default: 20 px for a bit, or as many as 16384 px take]
+    /// Longest side of the texture in px; a cell of a tag needs at least 4 px, of a checkerboard tag 12 [default: 20
+    /// px per cell, limited to 16384 px]
     #[arg(long, value_name = "PX", allow_negative_numbers = true, value_parser = whole(SIDE_PX))]
     texture: Option<u32>,
-    /// Share the faces among so many textures, each of the size that --texture says, so that they are
-    /// sharper, or smaller where nothing is said of it [default: 1]
+    /// Distribute the faces over N textures, each of the size given by --texture, for more detail; without --texture,
+    /// for smaller files [default: 1]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
           value_parser = whole(1..=MAX_TEXTURES))]
     textures: Option<u32>,
-    /// Resolution of the texture, dots per inch, instead of its size
+    /// Resolution of the texture in dots per inch, instead of --texture
     #[arg(long, value_name = "DPI", allow_negative_numbers = true, conflicts_with = "texture",
           value_parser = number(TEXTURE_DPI))]
     texture_dpi: Option<f64>,
 }
 
 impl Meshes {
-    /// These, and those of a template, with what it says of them where these say nothing.
+    /// Returns these meshes and those of a template, with the template's options where these have none.
     pub fn or(self, template: Self) -> Self {
         let is_sized = self.texture.is_some() || self.texture_dpi.is_some();
         Self {
@@ -95,24 +94,24 @@ impl Meshes {
             usd: self.usd || template.usd,
             threemf: self.threemf || template.threemf,
             inlay: self.inlay.or(template.inlay),
-            // A texture has one size.
+            // Size and resolution exclude each other.
             texture: self.texture.or(template.texture.filter(|_| !is_sized)),
             texture_dpi: self.texture_dpi.or(template.texture_dpi.filter(|_| !is_sized)),
             textures: self.textures.or(template.textures),
         }
     }
 
-    /// Whether any is asked for.
+    /// Whether any mesh is requested.
     pub fn is_any(&self) -> bool {
         self.is_textured() || self.threemf
     }
 
-    /// Whether any with a texture is asked for.
+    /// Whether any textured mesh is requested.
     fn is_textured(&self) -> bool {
         self.textured_formats().next().is_some()
     }
 
-    /// What is asked for that has textures.
+    /// Iterates over the requested textured formats.
     fn textured_formats(&self) -> impl Iterator<Item = What> {
         let formats = [
             (self.gltf, What::Gltf),
@@ -125,7 +124,7 @@ impl Meshes {
         formats.into_iter().filter(|(is_asked, _)| *is_asked).map(|(_, what)| what)
     }
 
-    /// These, and the glTF.
+    /// Returns these meshes and the glTF.
     pub fn with_gltf(self) -> Self {
         Self { gltf: true, ..self }
     }
@@ -135,19 +134,19 @@ impl Meshes {
         self.obj || self.sdf || self.urdf || self.mjcf
     }
 
-    /// Refuses options of a mesh that is not made.
+    /// Rejects options of meshes that are not requested.
     pub fn check_use(&self, plate: Option<&str>) -> anyhow::Result<()> {
         let (textured, any) = (self.is_textured(), self.is_any());
         refuse_idle(&[
-            ("--texture", self.texture.is_some(), textured, "a mesh: add --gltf"),
-            ("--textures", self.textures.is_some(), textured, "a mesh: add --gltf"),
-            ("--texture-dpi", self.texture_dpi.is_some(), textured, "a mesh: add --gltf"),
-            ("--plate", plate.is_some(), any, "a mesh: add --gltf"),
-            ("--inlay", self.inlay.is_some(), self.threemf, "two bodies: add --3mf"),
+            ("--texture", self.texture.is_some(), textured, "a mesh, such as --gltf"),
+            ("--textures", self.textures.is_some(), textured, "a mesh, such as --gltf"),
+            ("--texture-dpi", self.texture_dpi.is_some(), textured, "a mesh, such as --gltf"),
+            ("--plate", plate.is_some(), any, "a mesh, such as --gltf"),
+            ("--inlay", self.inlay.is_some(), self.threemf, "--3mf"),
         ])?;
-        // A template says what the parser of options would refuse.
+        // A template may contain what the option parser would reject.
         if self.texture.is_some() && self.texture_dpi.is_some() {
-            bail!("--texture, --texture-dpi: give one of them");
+            bail!("--texture conflicts with --texture-dpi; remove one of them");
         }
         if let Some(count) = self.textures.filter(|count| !(1..=MAX_TEXTURES).contains(count)) {
             bail!("--textures: {count} is not between 1 and {MAX_TEXTURES}");
@@ -164,7 +163,8 @@ impl Meshes {
         }
     }
 
-    /// The files that are asked for, and a line on their texture to be told after others; empty where there is none.
+    /// Returns the requested files, and a line about their texture to be printed after others; empty without a
+    /// texture.
     pub fn files(
         &self,
         target: &Target,
@@ -190,7 +190,7 @@ impl Meshes {
         Ok((files, told))
     }
 
-    /// The files with a texture that are asked for, and a line on it.
+    /// Returns the requested textured files, and a line about the texture.
     fn textured(
         &self,
         target: &Target,
@@ -210,7 +210,7 @@ impl Meshes {
         meshing.textures = self.textures.unwrap_or(meshing.textures);
         let mesh = TexturedMesh::new(target, meshing);
         let mesh = mesh.map_err(|error| refusal(&error, option))?;
-        // Scenes have the files of the OBJ in common.
+        // Scenes share the files of the OBJ.
         let files: BTreeMap<String, Vec<u8>> =
             self.textured_formats().flat_map(|what| of_mesh(&mesh, what)).collect();
         let files = files.into_iter().map(|(name, bytes)| bytes_file(name, bytes)).collect();
@@ -218,16 +218,16 @@ impl Meshes {
     }
 }
 
-/// A line on the textures of a mesh.
+/// Describes the textures of a mesh in one line.
 fn told(mesh: &TexturedMesh) -> String {
     let sizes = || mesh.textures.iter().map(|texture| texture.size_px);
     let [width, height] = [0, 1].map(|axis| sizes().map(|size| size[axis]).max().unwrap_or(0));
     let texels = mesh.texels_per_bit;
-    let texels = texels.map_or(String::new(), |px| format!(", {px:.1} px for a bit of a tag"));
+    let texels = texels.map_or(String::new(), |px| format!(", {px:.1} px per tag cell"));
     let textures = match mesh.textures.len() {
         1 => "texture:".to_owned(),
-        count if sizes().all(|size| size == [width, height]) => format!("textures: {count} of"),
-        count => format!("textures: {count} of up to"),
+        count if sizes().all(|size| size == [width, height]) => format!("textures: {count} with"),
+        count => format!("textures: {count} with up to"),
     };
     format!("\n{textures} {width} × {height} px{texels}")
 }
@@ -237,32 +237,33 @@ fn told(mesh: &TexturedMesh) -> String {
 pub struct PlateMeshes {
     #[command(flatten)]
     pub meshes: Meshes,
-    /// Thickness of the plate that carries the board in a mesh [default: 3mm]
+    /// Thickness of the plate under the board in a mesh [default: 3mm]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, help_heading = MESHES)]
     pub plate: Option<String>,
 }
 
 impl PlateMeshes {
-    /// Whether any is asked for.
+    /// Whether any mesh is requested.
     pub fn is_any(&self) -> bool {
         self.meshes.is_any()
     }
 
-    /// Refuses options of a mesh that is not made, and another thickness than that between two sides.
+    /// Rejects options of meshes that are not requested, and a thickness that differs from the distance between two
+    /// sides.
     pub fn check_use(&self, two_sided_mm: Option<f64>) -> anyhow::Result<()> {
         if self.plate.is_some() && two_sided_mm.is_some() {
-            bail!("--plate: the plate is as thick as --two-sided says: leave it out");
+            bail!("--plate conflicts with --two-sided, which sets the thickness; remove it");
         }
         self.meshes.check_use(self.plate.as_deref())
     }
 
-    /// As [`Meshes::files`].
+    /// Like [`Meshes::files`].
     pub fn files(&self, target: &Target) -> anyhow::Result<(Vec<File>, String)> {
         self.meshes.files(target, length("plate", &self.plate)?)
     }
 }
 
-/// Why there is no mesh, with the option that is at fault; where no other is, that is `option`.
+/// Describes why there is no mesh, with the responsible option, or `option` if there is no other.
 fn refusal(error: &MeshError, option: Option<&str>) -> anyhow::Error {
     let option = match error {
         MeshError::Thickness(_) => Some("--plate"),

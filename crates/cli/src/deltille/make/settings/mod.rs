@@ -1,13 +1,14 @@
-//! What commands that make targets are told: options, the same as keys of a template.
+//! Settings of the commands that make targets, both as options and as keys of a template.
 //!
-//! Comes in: parsed options, and the text of a template. Goes out: specs, and the files of meshes and drawings that are
-//! asked for. A command meets the files in this order:
+//! Input: parsed options, and the text of a template. Output: specifications, and the requested mesh and drawing
+//! files. The modules, in the order in which a command uses them:
 //!
-//! 1. `board_settings` and `solid_settings` are all that boards and solids are told; options replace what a template says.
-//! 2. `template` reads that file, and writes the settings of this command for another.
-//! 3. `logo` reads the logo; `option_checks` takes lengths from options and refuses those that say nothing.
-//! 4. `finishing` is for boards that are no plain prints: mirror images, spot colours, drawings for a laser.
-//! 5. `meshes` are models of the target.
+//! 1. `board_settings` and `solid_settings` contain all settings of boards and solids; options replace those of a
+//!    template.
+//! 2. `template` reads a template file, and writes the settings of a command as one.
+//! 3. `logo` reads the logo. `option_checks` parses lengths, and rejects options without effect.
+//! 4. `finishing` covers boards that are not plain prints: mirror images, spot colours, laser drawings.
+//! 5. `meshes` covers models of the target.
 
 pub mod board_settings;
 pub mod finishing;

@@ -1,4 +1,4 @@
-//! What the commands that make solids are told: the same settings as options and as a TOML template.
+//! Settings of the commands that make solids, both as options and as a TOML template.
 
 #![allow(rustdoc::invalid_html_tags)] // The comments on options are the help of the program, too.
 
@@ -21,10 +21,10 @@ use deltille::targets::{
     BORDER_BITS, FACE_TILES, MOST_ROWS, SkeletonSpec, SolidShape, SolidSpec, TagSpec, TagsIn,
 };
 
-/// Heading of the help.
-const BODIES: &str = "Bodies to print, outlines to cut";
+/// Help heading of bodies and outlines.
+const BODIES: &str = "Bodies to 3D-print, outlines to cut";
 
-/// Settings as they are given; what is not given has a default.
+/// Settings as given; those that are not given have defaults.
 #[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct SolidSettings {
@@ -34,7 +34,7 @@ pub struct SolidSettings {
     /// Sides of a cuboid.
     #[arg(skip)]
     pub size: Option<String>,
-    /// File of a mesh, and what its command is told of it.
+    /// File of a mesh, and the options of its command.
     #[arg(skip)]
     pub mesh: Option<PathBuf>,
     #[arg(skip)]
@@ -46,45 +46,46 @@ pub struct SolidSettings {
     #[arg(skip)]
     #[serde(skip_serializing_if = "is_false")]
     pub allow_skew: bool,
-    /// Edge of the solid, such as 150mm, 15cm, 6in [default: 150mm]
+    /// Edge length of the solid, such as 150mm, 15cm, 6in [default: 150mm]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     pub edge: Option<String>,
-    /// Black tiles along each side of a face, 6 to 200 [default: 10]
+    /// Number of black tiles along each side of a face, 6 to 200 [default: 10]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(FACE_TILES))]
     pub tiles: Option<u32>,
-    /// Blank between a face's edges and its tiles [default: 5mm, with a skeleton at least 3 mm on
-    /// its panels]
+    /// Blank margin between the edges of a face and its tiles [default: 5mm; at least 3 mm on the panels of a
+    /// skeleton]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     pub face_margin: Option<String>,
     /// Tag family: a name from `deltag list`, or a family file [default: delTag25h7]
     #[arg(long, help_heading = TAGS)]
     pub family: Option<String>,
-    /// A small place code in every upright tile: any few tiles beside each other tell where they are
+    /// Put a small position code in every upright tile: any few adjacent tiles identify their position
     #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tag_spacing", "first_id"])]
     #[serde(skip_serializing_if = "is_false")]
     pub dense: bool,
-    /// No tags; faces are not told apart
+    /// Make a solid without tags; its faces cannot be distinguished
     #[arg(long, help_heading = TAGS,
           conflicts_with_all = ["family", "dense", "tag_spacing", "tag_border", "hole", "first_id", "tag_ids"])]
     #[serde(skip_serializing_if = "is_false")]
     pub untagged: bool,
-    /// White tiles on black, which takes a part of the margin [default margin: 8mm]
+    /// Exchange black and white: white tiles on black, in part of the margin [default margin: 8mm]
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     pub invert: bool,
-    /// A tag in every n-th row and column of a face [default: 3]
+    /// Put a tag in every N-th row and column of a face [default: 3]
     #[arg(long, help_heading = TAGS, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
     pub tag_spacing: Option<u32>,
-    /// Black border of a tag, in widths of a bit [default: 1.5]
+    /// Width of a tag's black border in cells [default: 1.5]
     #[arg(long, help_heading = TAGS, value_name = "BITS", allow_negative_numbers = true, value_parser = number(BORDER_BITS))]
     pub tag_border: Option<f64>,
-    /// A hole in the middle of each triangular tag, for a screw or a camera, of a family made with `deltag gen-family --free centre`
+    /// Diameter of a hole in the middle of each triangular tag, for a screw or a camera; needs a family made with
+    /// `deltag gen-family --free centre`
     #[arg(long, help_heading = TAGS, value_name = "DIAMETER", allow_hyphen_values = true)]
     pub hole: Option<String>,
     /// Id of the first tag; the others follow, face by face [default: 0]
     #[arg(long, help_heading = TAGS, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     pub first_id: Option<u32>,
-    /// The id of each tag beside it, in small type
+    /// Print the id of each tag beside it in small type
     #[arg(long, help_heading = TAGS)]
     #[serde(skip_serializing_if = "is_false")]
     pub tag_ids: bool,
@@ -95,26 +96,25 @@ pub struct SolidSettings {
     #[arg(long, help_heading = BODIES)]
     #[serde(skip_serializing_if = "is_false")]
     pub stl: bool,
-    /// Write <name>-skeleton.stl, a frame to print with a seat for a panel on each face
+    /// Write <name>-skeleton.stl, a frame to 3D-print, with a seat for a panel on each face
     #[arg(long, help_heading = BODIES)]
     #[serde(skip_serializing_if = "is_false")]
     pub skeleton: bool,
-    /// Thickness of the panels and what is glued on them [default: 3mm]
+    /// Thickness of a panel including anything glued on it [default: 3mm]
     #[arg(long, help_heading = BODIES, value_name = "LENGTH", allow_hyphen_values = true)]
     pub panel_thickness: Option<String>,
     /// Thickness of the skeleton below the panels [default: 4mm]
     #[arg(long, help_heading = BODIES, value_name = "LENGTH", allow_hyphen_values = true)]
     pub wall: Option<String>,
-    /// Distance of the seats from the edges of the faces [default: the least that stays solid]
+    /// Distance of the seats from the edges of the faces [default: the smallest that stays solid]
     #[arg(long, help_heading = BODIES, value_name = "LENGTH", allow_hyphen_values = true)]
     pub rib: Option<String>,
-    /// Write <name>-panels.dxf, the outlines of all faces to cut, or of what the seats of the
-    /// skeleton take, and without --per-face <name>-net.dxf, the net to cut, score and fold
-    /// (millimetres)
+    /// Write <name>-panels.dxf, outlines to cut of all faces or, with --skeleton, of its panels; without --per-face
+    /// also <name>-net.dxf, the net to cut, score and fold (millimetres)
     #[arg(long, help_heading = BODIES)]
     #[serde(skip_serializing_if = "is_false")]
     pub dxf: bool,
-    /// Write <name>.pdf: the net to cut out, fold and glue, or with --per-face a page per face
+    /// Write <name>.pdf: the net to cut out, fold and glue, or one page per face with --per-face
     #[arg(long, help_heading = PRINT)]
     #[serde(skip_serializing_if = "is_false")]
     pub pdf: bool,
@@ -126,17 +126,16 @@ pub struct SolidSettings {
     #[arg(long, help_heading = PRINT)]
     #[serde(skip_serializing_if = "is_false")]
     pub png: bool,
-    /// Print each face on a sheet of its own, to be glued on a rigid skeleton, instead of the net
+    /// Print each face on its own sheet instead of the net, to be glued on a rigid skeleton
     #[arg(long, help_heading = PAPER)]
     #[serde(skip_serializing_if = "is_false")]
     pub per_face: bool,
-    /// Print a net that is larger than the paper in one piece, over pages that are joined along seams
-    /// through its tiles, instead of in pieces of whole faces
+    /// Print a net larger than the paper in one piece, on pages joined along seams through its tiles, instead of in
+    /// pieces of whole faces
     #[arg(long, help_heading = PAPER, conflicts_with = "per_face")]
     #[serde(skip_serializing_if = "is_false")]
     pub allow_seams: bool,
-    /// One page more: a picture of the solid with the numbers of its faces, how it is put together, and a
-    /// ruler
+    /// Add a page with a picture of the solid and its face numbers, assembly instructions, and a ruler
     #[arg(long, help_heading = PAPER)]
     #[serde(skip_serializing_if = "is_false")]
     pub guide_page: bool,
@@ -144,35 +143,35 @@ pub struct SolidSettings {
     #[arg(long, help_heading = PRINT)]
     #[serde(skip_serializing_if = "is_false")]
     pub dsc: bool,
-    /// fork or original [default: fork]
+    /// Dialect of the .dsc: fork or original [default: fork]
     #[arg(long, help_heading = PRINT, value_name = "DIALECT")]
     pub dsc_dialect: Option<String>,
     /// Resolution of the PNG pages, dots per inch [default: 300]
     #[arg(long, help_heading = PRINT, value_parser = whole(200..=2400u32))]
     pub dpi: Option<u32>,
-    /// The paper; a net that is larger is printed in several pieces of whole faces.
+    /// The paper; a larger net is printed in several pieces of whole faces.
     #[arg(long, help_heading = PAPER, value_name = "SIZE", help = format!(
-        "{}; a net that is larger is printed in several pieces of whole faces [default: the smallest of A4 to A0 that \
-         takes it, else A0]",
+        "{}; a larger net is printed in several pieces of whole faces [default: the smallest of A4 to A0 that fits it, \
+         otherwise A0]",
         PaperSize::choice()
     ))]
     pub paper: Option<String>,
-    /// auto, portrait or landscape [default: auto]
+    /// Page orientation: auto, portrait or landscape [default: auto]
     #[arg(long, help_heading = PAPER)]
     pub orientation: Option<String>,
-    /// Blank along the edges of the paper [default: 5mm]
+    /// Blank margin along the edges of the paper [default: 5mm]
     #[arg(long, help_heading = PAPER, value_name = "LENGTH", allow_hyphen_values = true)]
     pub margin: Option<String>,
-    /// Printed on the label of every sheet beside the name, such as whose it is
+    /// Text for the label of every sheet, beside the name, such as the owner
     #[arg(long, value_name = "TEXT")]
     pub note: Option<String>,
-    /// An SVG that is printed black at the other end of the label's strip: filled paths and strokes; white is paper
+    /// SVG logo, printed in black opposite the label: filled paths and strokes; white is paper
     #[arg(long, value_name = "FILE")]
     pub logo: Option<String>,
-    /// Height of the logo [default: that of the strip]
+    /// Height of the logo [default: the height of the label strip]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     pub logo_height: Option<String>,
-    /// Stem of the files' names, printed on the sheets [default: the solid's name]
+    /// Stem of the file names, also printed on the sheets [default: the solid's name]
     #[arg(long)]
     pub name: Option<String>,
     /// Meshes.
@@ -191,18 +190,18 @@ impl SolidSettings {
         template::read(path, command, |settings: &Self| settings.command.as_deref())
     }
 
-    /// The text of a template.
+    /// Returns the text of a template.
     pub fn to_toml(&self, command: &str) -> String {
         template::text(&Self { command: Some(command.to_owned()), ..self.clone() })
     }
 
-    /// These settings, and those of a template where these say nothing.
+    /// Returns these settings, completed by those of a template.
     pub fn or(self, template: Self) -> Self {
         let formats = self.printed();
         let png = self.png || (template.png && !formats);
         let (bare, dense) = (self.untagged, self.dense);
         let tagged = self.of_tags().into_iter().any(|(_, given)| given);
-        // Which tags there are, is said as a whole: what an option says of it replaces what else a template says.
+        // Tag settings are replaced as a whole: an option also overrides conflicting settings of the template.
         Self {
             command: None,
             untagged: bare || (template.untagged && !tagged),
@@ -216,7 +215,7 @@ impl SolidSettings {
             first_square_id: self.first_square_id.or(template.first_square_id.filter(|_| !bare)),
             tag_ids: self.tag_ids || (template.tag_ids && !bare && !dense),
             invert: self.invert || template.invert,
-            // A mesh has one size.
+            // Edge and scale of a mesh exclude each other.
             scale: self.scale.or(template.scale.filter(|_| self.edge.is_none())),
             edge: self.edge.or(template.edge.filter(|_| self.scale.is_none())),
             per_face: self.per_face || (template.per_face && !self.allow_seams),
@@ -224,7 +223,7 @@ impl SolidSettings {
             pdf: self.pdf || (template.pdf && !formats),
             svg: self.svg || (template.svg && !formats),
             png,
-            // Of no use where other formats are asked for than in the template.
+            // Unused if the options select other formats than the template.
             dpi: self.dpi.or(template.dpi.filter(|_| png || !template.png)),
             size: self.size.or(template.size),
             mesh: self.mesh.or(template.mesh),
@@ -253,7 +252,7 @@ impl SolidSettings {
         }
     }
 
-    /// Refuses what a template says of the shape of another solid.
+    /// Rejects shape settings of another solid in a template.
     pub fn check_shape(&self, command: &str) -> anyhow::Result<()> {
         let keys = [
             ("size", self.size.is_some(), "cuboid"),
@@ -265,23 +264,23 @@ impl SolidSettings {
         ];
         match keys.into_iter().find(|(_, is_given, of)| *is_given && *of != command) {
             Some((key, _, of)) => {
-                bail!("--template: `{key}` is of `{of}`, not of `{command}`: leave it out")
+                bail!("--template: `{key}` is a setting of `{of}`, not of `{command}`; remove it")
             }
             None => Ok(()),
         }
     }
 
-    /// Whether a format to print is asked for.
+    /// Whether a print format is requested.
     pub fn printed(&self) -> bool {
         self.pdf || self.svg || self.png
     }
 
-    /// Refuses options that nothing asked for makes use of.
+    /// Rejects options without effect.
     pub fn check_use(&self) -> anyhow::Result<()> {
         let layout = self.printed() || self.dxf;
-        let needed = "--pdf, --svg, --png or --dxf: add one";
+        let needed = "--pdf, --svg, --png or --dxf";
         refuse_idle(&[
-            ("--dpi", self.dpi.is_some(), self.png, "--png: add one"),
+            ("--dpi", self.dpi.is_some(), self.png, "--png"),
             ("--paper", self.paper.is_some(), layout, needed),
             ("--orientation", self.orientation.is_some(), layout, needed),
             ("--margin", self.margin.is_some(), layout, needed),
@@ -291,15 +290,10 @@ impl SolidSettings {
             ("--tag-ids", self.tag_ids, layout, needed),
             ("--note", self.note.is_some(), layout, needed),
             ("--logo", self.logo.is_some(), layout, needed),
-            ("--logo-height", self.logo_height.is_some(), self.logo.is_some(), "--logo: add one"),
-            (
-                "--panel-thickness",
-                self.panel_thickness.is_some(),
-                self.skeleton,
-                "--skeleton: add one",
-            ),
-            ("--wall", self.wall.is_some(), self.skeleton, "--skeleton: add one"),
-            ("--rib", self.rib.is_some(), self.skeleton, "--skeleton: add one"),
+            ("--logo-height", self.logo_height.is_some(), self.logo.is_some(), "--logo"),
+            ("--panel-thickness", self.panel_thickness.is_some(), self.skeleton, "--skeleton"),
+            ("--wall", self.wall.is_some(), self.skeleton, "--skeleton"),
+            ("--rib", self.rib.is_some(), self.skeleton, "--skeleton"),
         ])?;
         match self.dpi {
             Some(dpi) if !DPI.contains(&dpi) => {
@@ -309,7 +303,7 @@ impl SolidSettings {
         }
     }
 
-    /// The solid of a shape.
+    /// Returns the specification of a solid with this shape.
     pub fn spec(&self, shape: SolidShape) -> anyhow::Result<SolidSpec> {
         let default = SolidSpec::new(shape);
         let mut spec = SolidSpec {
@@ -330,7 +324,7 @@ impl SolidSettings {
         Ok(spec)
     }
 
-    /// The options that say something of tags, and whether they are given.
+    /// Returns the tag options, and whether each is given.
     fn of_tags(&self) -> [(&'static str, bool); 8] {
         [
             ("--family", self.family.is_some()),
@@ -344,7 +338,7 @@ impl SolidSettings {
         ]
     }
 
-    /// The tags of all faces, or of those of a tiling where there are two.
+    /// Returns the tags of all faces, or those of one tiling if there are two.
     fn tags(&self, tiling: GridKind) -> anyhow::Result<Option<TagSpec>> {
         check_tags(self.untagged, self.dense, &self.of_tags())?;
         if self.untagged {
@@ -361,13 +355,13 @@ impl SolidSettings {
         }))
     }
 
-    /// The tags of rectangular faces, `usual` where there are such beside others.
+    /// Returns the tags of rectangular faces; `usual` if the solid also has other faces.
     fn square_tags(&self, usual: Option<TagSpec>) -> anyhow::Result<Option<TagSpec>> {
         let is_asked = self.square_family.is_some() || self.first_square_id.is_some();
         match usual {
             None if is_asked => bail!(
-                "--square-family, --first-square-id: the mesh has no rectangles beside other faces: give --family \
-                 or --first-id"
+                "--square-family and --first-square-id apply only to meshes with both rectangular and other faces; use \
+                 --family or --first-id"
             ),
             None => Ok(None),
             Some(_) if self.untagged => Ok(None),
@@ -392,7 +386,7 @@ impl SolidSettings {
         }))
     }
 
-    /// What it is printed on.
+    /// Returns the paper.
     pub fn paper(&self) -> anyhow::Result<PaperSpec> {
         let paper = PaperSpec {
             size: self.paper.as_deref().map(str::parse).transpose().context("--paper")?,
@@ -414,7 +408,7 @@ impl SolidSettings {
         logo::on(paper, self.logo.as_deref(), length("logo-height", &self.logo_height)?)
     }
 
-    /// Whose list of corners and tags is written, if any.
+    /// Returns the dialect of the list of corners and tags, if it is written.
     pub fn dsc(&self) -> anyhow::Result<Option<Dialect>> {
         match &self.dsc_dialect {
             Some(text) => {

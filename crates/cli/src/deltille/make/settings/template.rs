@@ -1,4 +1,4 @@
-//! Templates: the settings of a command as a TOML file, to be given again.
+//! Templates: the settings of a command as a TOML file, for reuse.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use deltille::limits;
 use deltille_core::reading::in_words;
 use deltille_core::words::quoted;
 
-/// The settings in a file that was made for a command.
+/// Reads the settings in a file that was made for a command.
 pub fn read<T: DeserializeOwned>(
     path: &Path,
     command: &str,
@@ -24,7 +24,7 @@ pub fn read<T: DeserializeOwned>(
         let before = error.span().map_or("", |span| &text[..span.start]);
         let line = before.matches('\n').count();
         let field = text.lines().nth(line).and_then(|line| line.split('=').next());
-        // A line may be the name of a table, or blank.
+        // The line may be a table name, or blank.
         let field =
             field.unwrap_or_default().trim_matches(|c: char| c.is_whitespace() || "[]".contains(c));
         let field = if field.is_empty() { String::new() } else { format!(", {}", quoted(field)) };
@@ -40,13 +40,13 @@ pub fn read<T: DeserializeOwned>(
     }
 }
 
-/// The text of a template.
+/// Returns the text of a template.
 pub fn text(settings: &impl Serialize) -> String {
     let toml = toml::to_string(settings).expect("plain settings have a TOML form");
     format!("# {GENERATOR}, template\n{toml}")
 }
 
-/// A template that is to be written once all else is.
+/// A template to be written after everything else.
 pub struct Template<'a> {
     path: &'a Path,
     text: String,
@@ -54,10 +54,10 @@ pub struct Template<'a> {
 }
 
 impl<'a> Template<'a> {
-    /// Refused where another file would be replaced.
+    /// Fails if another file would be replaced.
     pub fn new(path: &'a Path, text: String, overwrite: Overwrite) -> anyhow::Result<Self> {
         if path.is_dir() {
-            bail!("--save-template: {} is a folder: give a file", path.display());
+            bail!("--save-template: {} is a folder; expected a file", path.display());
         }
         overwrite.check(path, &Kind::of(text.as_bytes())).context("--save-template")?;
         Ok(Self { path, text, overwrite })
