@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use crate::output::tell;
+use crate::output::log;
 use deltille::export::atomic;
 use deltille_core::words::shown;
 
@@ -22,7 +22,7 @@ const INTERRUPT: u8 = 2;
 static FLAG: AtomicBool = AtomicBool::new(false);
 static SIGNAL: AtomicU8 = AtomicU8::new(INTERRUPT);
 static KEEPS: AtomicBool = AtomicBool::new(false);
-static STANDING: Mutex<Cow<'static, str>> = Mutex::new(Cow::Borrowed("the work was not finished"));
+static STATUS: Mutex<Cow<'static, str>> = Mutex::new(Cow::Borrowed("the work was not finished"));
 
 /// Returns the flag that becomes true with the first signal.
 pub fn flag() -> &'static AtomicBool {
@@ -46,16 +46,16 @@ pub fn keeps_results() {
 }
 
 /// Sets the status that is printed if the work is aborted from now on.
-pub fn stands(how: impl Into<Cow<'static, str>>) {
-    *STANDING.lock().unwrap_or_else(PoisonError::into_inner) = how.into();
+pub fn set_status(status: impl Into<Cow<'static, str>>) {
+    *STATUS.lock().unwrap_or_else(PoisonError::into_inner) = status.into();
 }
 
 /// Ends the process: removes partially written files, and prints the status on one line.
 pub fn leave(how: Option<&str>) -> ! {
     // A second caller waits here until the process ends.
     let _nothing_more = atomic::abandon();
-    let standing = STANDING.lock().unwrap_or_else(PoisonError::into_inner);
-    let how = shown(how.unwrap_or(&standing)).into_owned();
+    let status = STATUS.lock().unwrap_or_else(PoisonError::into_inner);
+    let how = shown(how.unwrap_or(&status)).into_owned();
     // The terminal may be gone.
     let _ = writeln!(std::io::stderr(), "interrupted: {how}");
     std::process::exit(exit_code().into())
@@ -72,7 +72,7 @@ fn raise(signal: u8) {
             leave(None);
         }
         std::thread::sleep(6 * PATIENCE);
-        tell!("writing the results; a second signal aborts");
+        log!("writing the results; a second signal aborts");
     });
 }
 

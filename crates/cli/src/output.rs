@@ -78,7 +78,7 @@ macro_rules! say {
 pub(crate) use say;
 
 /// Prints a [`line`] on standard error.
-macro_rules! tell {
+macro_rules! log {
     ($($argument:tt)*) => {{
         // Standard error may be closed.
         let _ = ::std::io::Write::write_all(
@@ -87,17 +87,17 @@ macro_rules! tell {
         );
     }};
 }
-pub(crate) use tell;
+pub(crate) use log;
 
 /// Output format of a command.
 #[derive(clap::Args, Clone, Copy, Default)]
-pub struct Telling {
+pub struct ResultFormat {
     /// Print the result as JSON, and nothing else, on standard output
     #[arg(long)]
     json: bool,
 }
 
-impl Telling {
+impl ResultFormat {
     /// Whether the result is printed as JSON.
     pub fn is_json(self) -> bool {
         self.json

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::output::tell;
+use crate::output::log;
 use deltille::family::Progress;
 use deltille_core::words::counted;
 
@@ -55,7 +55,7 @@ impl SearchProgress {
         let mut last = last.lock().expect("no thread panics here");
         if last.elapsed() >= Self::EVERY {
             *last = Instant::now();
-            tell!("{} %, {codes}", 100 * done / total.max(1));
+            log!("{} %, {codes}", 100 * done / total.max(1));
         }
     }
 

@@ -8,7 +8,7 @@ use anyhow::Context;
 use clap::Parser;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
-use crate::output::tell;
+use crate::output::log;
 use crate::{interrupt, wording};
 use deltille_core::words::{cut, shown, with_short_quotes};
 
@@ -43,10 +43,10 @@ pub fn run_with<A: Parser>(
     program: impl FnOnce(A) -> anyhow::Result<ExitCode>,
 ) -> ExitCode {
     interrupt::listen();
-    wording::speak();
+    wording::install();
     let mut command = A::command();
     let parsed = command.try_get_matches_from_mut(&arguments).and_then(|matches| {
-        wording::runs(&command, &matches);
+        wording::set_command(&command, &matches);
         A::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
     });
     let result = match parsed {
@@ -74,7 +74,7 @@ pub fn run_with<A: Parser>(
 
 /// Prints an error and its causes on one line.
 pub fn report(error: &anyhow::Error) {
-    tell!("error: {}", message(error));
+    log!("error: {}", message(error));
 }
 
 /// Returns an error and its causes on one line. Omits causes that are already part of the message.

@@ -104,13 +104,13 @@ const fn named(setting: Setting) -> (&'static str, &'static str) {
 /// The options of the running command.
 static OPTIONS: OnceLock<Vec<String>> = OnceLock::new();
 
-/// Makes messages name settings by options: by those of the running command as soon as it is known, see [`runs`].
-pub fn speak() {
-    setting::speak(|setting| told(setting, OPTIONS.get().map_or(&[], Vec::as_slice)));
+/// Makes messages name settings by options: by those of the running command as soon as it is known, see [`set_command`].
+pub fn install() {
+    setting::speak(|setting| worded(setting, OPTIONS.get().map_or(&[], Vec::as_slice)));
 }
 
 /// Records which command of a program is running.
-pub fn runs(program: &Command, matches: &ArgMatches) {
+pub fn set_command(program: &Command, matches: &ArgMatches) {
     let (mut command, mut matches) = (program, matches);
     while let Some((name, inner)) = matches.subcommand() {
         let Some(found) = command.find_subcommand(name) else { break };
@@ -132,7 +132,7 @@ fn options(command: &Command) -> Vec<String> {
 }
 
 /// Names a setting for a command with these options.
-fn told(setting: Setting, options: &[String]) -> String {
+fn worded(setting: Setting, options: &[String]) -> String {
     match named(setting) {
         (command, "") => format!("`{command}`"),
         (_, option) if is_among(option, options) => option.to_owned(),
@@ -171,12 +171,12 @@ mod tests {
 
     #[test]
     fn settings_are_named_by_options_of_the_running_command_first() {
-        let told = |setting, command| told(setting, &options_of(command));
-        assert_eq!(told(Setting::BoardRows, "deltille board"), "--rows");
-        assert_eq!(told(Setting::CalibrationRefinePanels, "deltille rig"), "--refine-target");
+        let worded = |setting, command| worded(setting, &options_of(command));
+        assert_eq!(worded(Setting::BoardRows, "deltille board"), "--rows");
+        assert_eq!(worded(Setting::CalibrationRefinePanels, "deltille rig"), "--refine-target");
         let elsewhere = "`deltille rig --refine-target`";
-        assert_eq!(told(Setting::CalibrationRefinePanels, "deltille calibrate"), elsewhere);
-        assert_eq!(told(Setting::TagsInBlack, "deltille checkerboard"), "--tags-in black");
-        assert_eq!(told(Setting::FamilyShippedNames, "deltag plan"), "`deltag list`");
+        assert_eq!(worded(Setting::CalibrationRefinePanels, "deltille calibrate"), elsewhere);
+        assert_eq!(worded(Setting::TagsInBlack, "deltille checkerboard"), "--tags-in black");
+        assert_eq!(worded(Setting::FamilyShippedNames, "deltag plan"), "`deltag list`");
     }
 }

@@ -107,7 +107,7 @@ fn proposed_photographs_are_taken_until_they_suffice() {
     let until = 1.01 * sure[sure.len() - 1];
     let watch = format!("guide photos --target desk.json --until {until} --picture next.png");
     let output = deltille(at, &watch).success().get_output().clone();
-    assert!(said(&output).contains("enough: calibrate the photographs of photos"));
+    assert!(said(&output).contains("done: calibrate with the photographs in photos"));
     let picture = image::open(at.join("next.png")).unwrap();
     assert_eq!((picture.width(), picture.height()), (1024, 768));
     let last = image::open(at.join("photos/7.png")).unwrap();
@@ -142,7 +142,7 @@ fn images_of_the_most_common_size_count_once_each() {
     assert!(said(&output).contains("\n4 views: projections are known"), "{}", said(&output));
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert!(
-        stderr.contains("b0.png: left out: it has 512 × 384 pixels, most have 1024 × 768"),
+        stderr.contains("b0.png: excluded: it has 512 × 384 pixels, but most images have 1024 × 768"),
         "{stderr}"
     );
     assert!(stderr.contains("c3: left out: it is a copy of the image of b3"), "{stderr}");

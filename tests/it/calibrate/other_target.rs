@@ -167,7 +167,7 @@ fn detections_without_a_target_are_noted_once() {
     let command =
         deltille(at, &format!("calibrate seen {SMALL} --model radtan -o right")).success();
     let said = String::from_utf8(command.get_output().stderr.clone()).unwrap();
-    let note = "note: 6 of 6 detections do not name the target that they were made with; assumed to be desk (";
+    let note = "note: 6 of 6 detections do not name a target; assumed to be desk (";
     assert_eq!(said.matches(note).count(), 1, "{said}");
 }
 

@@ -49,7 +49,7 @@ fn a_new_folder_with_the_name_of_a_file_is_refused() {
         let said = String::from_utf8(said.get_output().stderr.clone()).unwrap();
         assert!(said.contains(words) && said.lines().count() == 1, "{args}: {said}");
     };
-    let like_a_file = "-o: out.json looks like a file: give a folder, such as out";
+    let like_a_file = "-o: out.json looks like a file, but a folder is needed, such as out";
     for args in [
         "board --rows 4 --cols 5",
         "detect --target b.json none.png",
@@ -60,7 +60,7 @@ fn a_new_folder_with_the_name_of_a_file_is_refused() {
     }
     refused("undistort --camera c.yaml -o /dev/full", "-o: /dev/full");
     let pose = "pose none.png --target b.json --camera c.yaml -o /dev/full";
-    refused(pose, "-o /dev/full: is no folder; name a folder, or a file that ends in .ndjson");
+    refused(pose, "-o /dev/full is not a folder; expected a folder, or a file that ends in .ndjson");
     assert_eq!(names(at), before);
     // Where it is there as a folder, it is meant.
     std::fs::create_dir(at.join("out.json")).unwrap();

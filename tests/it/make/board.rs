@@ -41,7 +41,7 @@ fn force_replaces_a_symbolic_link_and_reports_it() {
     std::os::unix::fs::symlink("old.json", at.join("new.json")).unwrap();
     let output = made("board --rows 6 --cols 5 --name new --force").success();
     let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
-    let told = "new.json: replaced the symbolic link to old.json, which stays as it was";
+    let told = "new.json: replaced the symbolic link to old.json; its destination is unchanged";
     assert!(said.contains(told), "{said}");
     assert_eq!(std::fs::read(at.join("old.json")).unwrap(), before);
     assert!(!at.join("new.json").is_symlink());

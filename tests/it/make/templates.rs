@@ -181,11 +181,11 @@ fn options_override_the_meshes_lasers_and_inks_of_a_template() {
         ("rows = 4\n[plate]\nmm = 3\n", "line 2, `plate`: an object"),
         (
             "rows = 4\ncols = 5\nuntagged = true\nfamily = \"d25h7\"\n",
-            "--untagged: there are no tags: leave it or --family out",
+            "--untagged conflicts with --family; remove one of them",
         ),
         (
             "rows = 4\ncols = 5\nuntagged = true\ntag-spacing = 4\n",
-            "--untagged: there are no tags: leave it or --tag-spacing out",
+            "--untagged conflicts with --tag-spacing; remove one of them",
         ),
     ] {
         std::fs::write(folder.path().join("own.toml"), text).unwrap();
@@ -220,7 +220,7 @@ fn given_tags_replace_those_of_a_template() {
                 dense,
                 "--tag-spacing 4",
                 Err(
-                    "--dense: there are place codes and no other tags: leave it or --tag-spacing out",
+                    "--dense conflicts with --tag-spacing (position codes replace tags); remove one of them",
                 ),
             ),
         ] {

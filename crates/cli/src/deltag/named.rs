@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::bail;
 
-use crate::output::tell;
+use crate::output::log;
 use deltille::family::{self, Family, PAIRS_COUNTED, certify_codes, shipped_names};
 use deltille::lattice::GridKind;
 
@@ -35,7 +35,7 @@ pub fn resolve(name_or_path: &str) -> anyhow::Result<Family> {
         && let Some(failure) = certify_codes(&family).failures.first()
     {
         let file = Path::new(name_or_path).display();
-        tell!("warning: {file} contradicts its own claims: {failure}");
+        log!("warning: {file} contradicts its own claims: {failure}");
     }
     Ok(family)
 }

@@ -183,7 +183,7 @@ fn images_without_a_board_are_reported_with_the_most_common_reason() {
     ];
     let folder = folder(&board(8, 9), &empty);
     let why =
-        "no board of this kind in 4 pictures; 2 of them: 1 tag not on the target, for example id 4";
+        "no board of this kind found in 4 pictures; 2 of them: 1 tag not on the target, for example id 4";
     refused(folder.path(), CALIBRATE, &[why]);
     std::fs::create_dir(folder.path().join("b")).unwrap();
     let rig = "rig --camera a=corners --camera b=b --target board.json";
@@ -197,7 +197,7 @@ fn a_repeated_folder_is_reported_in_one_line() {
     let said = String::from_utf8(output(folder.path(), &command).stderr).unwrap();
     let copies: Vec<&str> = said.lines().filter(|line| line.contains("counted once")).collect();
     let [line] = copies.as_slice() else { panic!("{said}") };
-    assert!(line.contains("corners/00.json") && line.ends_with("5 more likewise"), "{line}");
+    assert!(line.contains("corners/00.json") && line.ends_with("5 more are duplicates"), "{line}");
 }
 
 #[test]

@@ -41,7 +41,7 @@ fn a_pair_with_an_upside_down_camera_is_rectified_upright() {
     }
     done(at, "rig --camera first=first --camera second=second --target board.json --model radtan");
     let said = done(at, "rectify rig.json --pair first,second -o pair");
-    assert!(said.contains("a point is in the same row of both pictures"), "{said}");
+    assert!(said.contains("a point is in the same row of both images"), "{said}");
     let pair = json(&at.join("pair/first-second.json"));
     // Their diagonals are 1 without a rotation.
     let upright: Vec<f64> = [0, 4, 8]

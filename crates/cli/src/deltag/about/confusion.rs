@@ -3,11 +3,11 @@
 use anyhow::bail;
 use serde_json::json;
 
-use crate::output::{self, Telling, say};
+use crate::output::{self, ResultFormat, say};
 use deltille::family::{Confusion, Family, PAIRS_COUNTED};
 
 /// Reports the minimum distance between the tags of two families.
-pub fn about(of: &Family, other: &Family, telling: Telling) -> anyhow::Result<()> {
+pub fn about(of: &Family, other: &Family, result_format: ResultFormat) -> anyhow::Result<()> {
     let Some(confusion) = Confusion::between(of, other) else {
         let bits = [of, other].map(|family| family.dimension().bits());
         if bits[0] != bits[1] {
@@ -24,7 +24,7 @@ pub fn about(of: &Family, other: &Family, telling: Telling) -> anyhow::Result<()
     let Confusion { direct, mirrored, .. } = &confusion;
     let within = |most: u32| [direct, mirrored].map(|all| all.range(..=most).map(|(_, n)| n).sum());
     let [t, u] = [of, other].map(Family::correctable);
-    if telling.is_json() {
+    if result_format.is_json() {
         return output::print_json(&json!({
             "families": [of.name(), other.name()],
             "corrects": [t, u],

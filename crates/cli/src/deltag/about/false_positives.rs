@@ -9,21 +9,21 @@ use deltille::family::{
 use deltille_core::words::counted;
 
 /// Adds the rates to the JSON description of a family.
-pub fn add_to(told: &mut Value, family: &Family) {
+pub fn add_to(described: &mut Value, family: &Family) {
     let natural = family.natural_false_positive_rates();
     let per_megapixel = natural
         .as_ref()
         .map(|rates| rates.iter().map(|rate| rate * TRIANGLES_PER_MEGAPIXEL).collect::<Vec<_>>());
-    told["false_positive_rate"] = json!(family.false_positive_rates());
-    told["natural_false_positive_rate"] = json!(&natural);
-    told["natural_false_positive_factor"] = json!(natural.as_ref().map(|_| NATURAL_FACTOR));
-    told["natural_false_positives_per_megapixel_at_most"] = json!(per_megapixel);
-    told["accepted_false_positive_rate"] = json!(ACCEPTED_FALSE_POSITIVES);
-    told["recommended_correction"] = json!(recommended_correction(natural.as_deref()));
+    described["false_positive_rate"] = json!(family.false_positive_rates());
+    described["natural_false_positive_rate"] = json!(&natural);
+    described["natural_false_positive_factor"] = json!(natural.as_ref().map(|_| NATURAL_FACTOR));
+    described["natural_false_positives_per_megapixel_at_most"] = json!(per_megapixel);
+    described["accepted_false_positive_rate"] = json!(ACCEPTED_FALSE_POSITIVES);
+    described["recommended_correction"] = json!(recommended_correction(natural.as_deref()));
 }
 
 /// Prints both rates for each number of corrected cells.
-pub fn tell(family: &Family) -> anyhow::Result<()> {
+pub fn print(family: &Family) -> anyhow::Result<()> {
     let natural = family.natural_false_positive_rates();
     say!("  probability that a triangle with a border that is not a tag is accepted as one");
     say!("    random bits   natural images  when correcting");

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::{confusion, false_positives, place_codes};
 use crate::deltag::named::resolve;
-use crate::output::{self, Telling, say};
+use crate::output::{self, ResultFormat, say};
 use deltille::family::{self, Family, HiddenCells, PAIRS_COUNTED, TagWords};
 use deltille::lattice::GridKind;
 use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
@@ -16,7 +16,7 @@ pub struct Args {
     #[arg(required = true, num_args = 1..=2, value_names = ["FAMILY", "OTHER"])]
     families: Vec<String>,
     #[command(flatten)]
-    telling: Telling,
+    result_format: ResultFormat,
 }
 
 /// Rows and columns of the board used to express the size of a family; the board of the paper.
@@ -48,19 +48,19 @@ fn upper_bound(family: &Family) -> (u64, &'static str) {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let [of, other] = &args.families[..] {
         let [of, other] = [resolve(of)?, resolve(other)?];
-        confusion::about(&of, &other, args.telling)?;
+        confusion::about(&of, &other, args.result_format)?;
         return Ok(ExitCode::SUCCESS);
     }
     let name = &args.families[0];
     let known = family::resolve(name)?;
     if known.is_of_places() {
-        place_codes::about(&known, args.telling)?;
+        place_codes::about(&known, args.result_format)?;
         return Ok(ExitCode::SUCCESS);
     }
     let family = resolve(name)?;
-    if args.telling.is_json() {
+    if args.result_format.is_json() {
         let (bound, _) = upper_bound(&family);
-        let mut told = json!({
+        let mut described = json!({
             "name": family.name(), "fingerprint": family.fingerprint(), "codes": family.len(),
             "bits": family.dimension().bits(), "distance": family.distance(),
             "corrects": family.correctable(), "rules": family.rules(),
@@ -69,10 +69,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         });
         let left = without_hidden(&family);
         let left = left.iter().map(|(cells, left)| (cells.name().to_owned(), json!(left)));
-        told["distance_without"] = left.collect::<serde_json::Map<_, _>>().into();
-        told["beginnings"] = json!(family.beginnings());
-        false_positives::add_to(&mut told, &family);
-        output::print_json(&told)?;
+        described["distance_without"] = left.collect::<serde_json::Map<_, _>>().into();
+        described["beginnings"] = json!(family.beginnings());
+        false_positives::add_to(&mut described, &family);
+        output::print_json(&described)?;
         return Ok(ExitCode::SUCCESS);
     }
     let (bits, rules) = (family.dimension().bits(), family.rules());
@@ -134,7 +134,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         "  enough for      {} of {rows} x {cols} corners ({board} tags each) or {solids} ({solid} tags each)",
         counted(family.len() / board, "board")
     );
-    false_positives::tell(&family)?;
+    false_positives::print(&family)?;
     if family.histogram().is_empty() {
         say!("  distances       not counted for this many codes");
         return Ok(ExitCode::SUCCESS);

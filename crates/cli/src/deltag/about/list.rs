@@ -2,19 +2,19 @@ use std::process::ExitCode;
 
 use serde_json::json;
 
-use crate::output::{self, Telling, say};
+use crate::output::{self, ResultFormat, say};
 use deltille::family::{self, places, shipped_names};
 
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    telling: Telling,
+    result_format: ResultFormat,
 }
 
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let families = shipped_names().into_iter().map(family::resolve);
     let families = families.collect::<Result<Vec<_>, _>>()?;
-    if args.telling.is_json() {
+    if args.result_format.is_json() {
         let listed = families.iter().map(|family| {
             json!({
                 "name": family.name(), "bits": family.dimension().bits(), "distance": family.distance(),
@@ -37,7 +37,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         );
     }
     say!(
-        "{:<12} {:>4}   place codes of {} boards: `deltag info {0}`",
+        "{:<12} {:>4}   position codes of {} boards: `deltag info {0}`",
         places::NAME,
         places::BITS,
         places::BOARDS

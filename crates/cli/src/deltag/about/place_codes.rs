@@ -2,14 +2,14 @@
 
 use serde_json::json;
 
-use crate::output::{self, Telling, say};
+use crate::output::{self, ResultFormat, say};
 use deltille::family::Family;
 use deltille::family::places::{BITS, BOARDS, PLACES, PatchCertificate, certify_places};
 use deltille_core::words::counted;
 
 /// Prints a description of the position codes.
-pub fn about(family: &Family, telling: Telling) -> anyhow::Result<()> {
-    if telling.is_json() {
+pub fn about(family: &Family, result_format: ResultFormat) -> anyhow::Result<()> {
+    if result_format.is_json() {
         let patches = certify_places().into_iter().map(|certificate| {
             let PatchCertificate { tiles, forms, least, .. } = certificate;
             json!({

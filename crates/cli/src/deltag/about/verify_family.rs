@@ -3,7 +3,7 @@ use std::process::ExitCode;
 use serde_json::json;
 
 use super::place_codes;
-use crate::output::{self, Telling, line, say};
+use crate::output::{self, ResultFormat, line, say};
 use crate::run::{BAD_INPUT, FAILED, report};
 use deltille::family::{self, Certificate, Family, FamilyFileError, Robust, certify};
 use deltille_core::words::counted;
@@ -20,12 +20,12 @@ pub struct Args {
     #[arg(required = true)]
     families: Vec<String>,
     #[command(flatten)]
-    telling: Telling,
+    result_format: ResultFormat,
 }
 
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (mut all_hold, mut all_read) = (true, true);
-    let mut told = Vec::new();
+    let mut results = Vec::new();
     for name in &args.families {
         let mut certificate = None;
         let (holds, what) = match family::resolve(name) {
@@ -39,8 +39,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             }
         };
         all_hold &= holds;
-        if args.telling.is_json() {
-            told.push(json!({
+        if args.result_format.is_json() {
+            results.push(json!({
                 "family": name, "holds": holds, "text": line(&what).trim_end(),
                 "distance": certificate.as_ref().map(|found| found.min_distance),
                 "mirror_distance": certificate.and_then(|found| found.mirror_distance),
@@ -51,8 +51,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             say!("{name}: FAILED. {what}");
         }
     }
-    if args.telling.is_json() {
-        output::print_json(&told)?;
+    if args.result_format.is_json() {
+        output::print_json(&results)?;
     }
     Ok(match (all_read, all_hold) {
         (false, _) => ExitCode::from(BAD_INPUT),

@@ -1,7 +1,7 @@
 use std::process::ExitCode;
 
 use super::parameters::Parameters;
-use crate::output::{self, Telling, say};
+use crate::output::{self, ResultFormat, say};
 use deltille::family::{
     self, Construction, bounds::bounds, invariant_bound, published_bounds, shipped_names,
 };
@@ -12,7 +12,7 @@ pub struct Args {
     /// Bits and distance, such as d25h7
     family: Parameters,
     #[command(flatten)]
-    telling: Telling,
+    result_format: ResultFormat,
 }
 
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
@@ -37,7 +37,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             shipped.push((name, family.len(), by_rank.map(|(_, count)| count)));
         }
     }
-    if args.telling.is_json() {
+    if args.result_format.is_json() {
         let shipped = shipped.iter().map(|(name, codes, by_rank)| {
             serde_json::json!({ "name": name, "codes": codes, "by_rank_before_rules": by_rank })
         });

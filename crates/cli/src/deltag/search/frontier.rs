@@ -6,7 +6,7 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 
 use super::parameters::Parameters;
-use crate::output::{self, Telling, say};
+use crate::output::{self, ResultFormat, say};
 use deltille::clock;
 use deltille::family::search::best::{Best, Budget};
 use deltille::family::{RuleChoice, Rules, best_rule, rule_choices};
@@ -22,7 +22,7 @@ pub struct Args {
     #[command(flatten)]
     choice: ChoiceArgs,
     #[command(flatten)]
-    telling: Telling,
+    result_format: ResultFormat,
 }
 
 /// Selection of the best rule.
@@ -89,7 +89,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let distance = args.family.distance;
     let choices = choices(args.family, &Rules::published(distance))?;
     let best = args.choice.best(&choices, distance)?;
-    if args.telling.is_json() {
+    if args.result_format.is_json() {
         let of = |choice: &RuleChoice| {
             serde_json::json!({
                 "min_pairs": choice.min_pairs, "min_complexity": choice.min_complexity,

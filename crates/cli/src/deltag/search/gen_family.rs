@@ -15,7 +15,7 @@ use super::rules::RuleArgs;
 use crate::deltag::about::verify_family::proof_of;
 use crate::deltag::named::resolve;
 use crate::interrupt;
-use crate::output::{self, Overwrite, say, tell};
+use crate::output::{self, Overwrite, say, log};
 use crate::progress::SearchProgress;
 use crate::run::FAILED;
 use crate::values::{name, number, whole};
@@ -152,7 +152,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Parameters { dimension, distance } = args.family;
     let name = args.name.clone().unwrap_or_else(|| format!("d{}h{distance}", dimension.bits()));
     let path = output::file(&args.output, &name, "json")?;
-    interrupt::stands("nothing was found yet; nothing was written");
+    interrupt::set_status("nothing was found yet; nothing was written");
     if let Err(FamilyError::Claim { problem, .. }) = check_name(&name, dimension, distance) {
         bail!("--name: {problem}");
     }
@@ -186,7 +186,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             there(&path).filter(|f| !args.overwrite.is_forced() && f.len() > family.len())
         {
             let beside = free_name(&path);
-            tell!(
+            log!(
                 "error: {} was kept, because its {} codes are more than the {} found, which were written to {}; use \
                  --force to replace it, or -o to set another path",
                 path.display(),
@@ -201,7 +201,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let is_whole = interrupted.is_none();
     match interrupted {
-        Some(message) => tell!("interrupted: {message}"),
+        Some(message) => log!("interrupted: {message}"),
         None => file.finish()?,
     }
     if let Some(family) = family.as_ref().filter(|f| !is_whole && f.len() > PAIRS_COUNTED) {
@@ -318,7 +318,7 @@ impl Args {
         let choices = frontier::choices(self.family, &rules)?;
         let Some(best) = self.choice.best(&choices, distance)? else { return Ok(rules) };
         let corrected = self.choice.corrected(distance)?;
-        tell!(
+        log!(
             "rule: at least {} pairs of cells differ, satisfied by {} of the known codes; natural false-positive rate {:.1e} with \
              {corrected} corrected",
             best.min_pairs,
@@ -493,11 +493,11 @@ impl Args {
         let extended = extended.map(|older| extended_by(name, &best, start.as_ref(), older));
         let extended = extended.transpose()?;
         if checkpoint.construction.is_some() {
-            tell!("resuming from {} of the checkpoint", counted(checkpoint.codes.len(), "code"));
+            log!("resuming from {} of the checkpoint", counted(checkpoint.codes.len(), "code"));
         } else if let Some(start) = &start {
             let codes = best.family_of(name, start)?;
             let proof = proof_of(&certify_codes(&codes), distance);
-            tell!("starting from {} of {}: {proof}", counted(codes.len(), "code"), start.family);
+            log!("starting from {} of {}: {proof}", counted(codes.len(), "code"), start.family);
         }
         if let Some(family) = extended {
             return Ok(Outcome::whole(family));

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::gen_family::{FILE_LIMIT, bytes_per_code};
 use crate::deltag::about::false_positives;
-use crate::output::{self, Telling, say};
+use crate::output::{self, ResultFormat, say};
 use crate::values::whole;
 use deltille::family::{Family, NATURAL_FACTOR, ShippedFamily, shipped_names, smallest_shipped};
 use deltille::lattice::GridKind;
@@ -27,7 +27,7 @@ pub struct Args {
           value_parser = whole(0..=31u32))]
     corrects: u32,
     #[command(flatten)]
-    telling: Telling,
+    result_format: ResultFormat,
 }
 
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
@@ -57,7 +57,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         );
     };
     let more = smallest_shipped(GridKind::Deltille, needed, best.correctable() + 1);
-    if args.telling.is_json() {
+    if args.result_format.is_json() {
         output::print_json(&serde_json::json!({
             "tags": needed, "best": of(best)?, "corrects_more": more.map(of).transpose()?,
         }))?;
@@ -79,12 +79,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 /// Describes a family for `--json`.
 fn of(family: &ShippedFamily) -> anyhow::Result<Value> {
-    let mut told = serde_json::json!({
+    let mut described = serde_json::json!({
         "name": family.name, "bits": family.bits, "distance": family.distance,
         "codes": family.codes, "corrects": family.correctable(),
     });
-    false_positives::add_to(&mut told, &Family::shipped(family.name)?);
-    Ok(told)
+    false_positives::add_to(&mut described, &Family::shipped(family.name)?);
+    Ok(described)
 }
 
 fn about(family: &Family) -> String {

@@ -10,7 +10,7 @@ use crate::deltille::calibrate::sightings::{GridArgs, SheetArgs};
 use crate::deltille::files::images::Images;
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::{camera_file, target_file};
-use crate::output::{self, Overwrite, say, tell};
+use crate::output::{self, Overwrite, say, log};
 use crate::run::FAILED;
 use deltille::calibrate::{Calibration, Diagnosis, Estimate, Reference, Words, views};
 use deltille::camera::Camera;
@@ -75,7 +75,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let camera = camera_file::read_for("--camera", &args.camera, &targets, args.assume_target)?;
     for target in &targets {
         if let Some(ambiguity) = Reference::Target(target).label_ambiguity() {
-            tell!("note: {}: {ambiguity}", target.name);
+            log!("note: {}: {ambiguity}", target.name);
         }
     }
     let finder = Finder { detector, camera, targets, sheet, limits };
@@ -92,7 +92,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let mut of_image = String::new();
         match finder.find(&image, &name)? {
             Seen::Unread(why) => {
-                tell!("error: {why}");
+                log!("error: {why}");
                 (without, unread) = (without + 1, unread + 1);
                 for target in finder.targets.iter().filter(|_| args.every_picture) {
                     of_image += &(pose::write_none(&name, &target.name, &why) + "\n");
@@ -111,7 +111,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                         Err(why) => {
                             // With several targets, an image need not show all of them.
                             if !is_there {
-                                tell!("{}: {}{why}", image.display(), finder.of_target(target));
+                                log!("{}: {}{why}", image.display(), finder.of_target(target));
                             }
                             if args.every_picture {
                                 let line = pose::write_none(&name, &target.name, &why);
@@ -194,7 +194,7 @@ impl Finder {
         // The limit of the lens is a property of the camera, equal for all images.
         for diagnosis in said.iter().filter(|said| !matches!(said, Diagnosis::LensEnds { .. })) {
             let of_target = self.of_target(target);
-            tell!("{}: {of_target}{}", image.display(), words.sentence(diagnosis));
+            log!("{}: {of_target}{}", image.display(), words.sentence(diagnosis));
         }
         Ok(Ok(found))
     }

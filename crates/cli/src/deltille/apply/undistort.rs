@@ -174,13 +174,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut files = args.view.files(&stem, &view, &map)?;
     files.insert(0, text_file(format!("{stem}.json"), undistortion::write(&made, &map)));
     let staged = Staged::new(&args.view.output, &files, args.view.overwrite)?;
-    say!("{}", told(made.view(), &map));
+    say!("{}", describe(made.view(), &map));
     let made = pictures.write(&images, &map)?;
     made.end(staged)
 }
 
 /// Describes a view in one line.
-fn told(view: &Camera, map: &PixelMap) -> String {
+fn describe(view: &Camera, map: &PixelMap) -> String {
     let field = |side: u32| 2.0 * (f64::from(side) / 2.0 / view.focal_px.x).atan().to_degrees();
     let [x, y, width, height] = map.whole_rectangle();
     let whole = match map.covered() {
@@ -357,7 +357,7 @@ pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
         let file =
             CameraFile { camera: view.view().clone(), calibrated_with, failed: failed.clone() };
         files.extend(args.view.files(&format!("{name}-rectified"), &file, map)?);
-        say!("{name}: {}", told(view.view(), map));
+        say!("{name}: {}", describe(view.view(), map));
     }
     let baseline = made.baseline_mm;
     let (mm, what) = match baseline.y == 0.0 {

@@ -9,7 +9,7 @@ use glam::DVec2;
 
 use crate::deltille::files::camera_file;
 use crate::deltille::files::written::{File, check_places, sample_of, text_file, write_all};
-use crate::output::{self, Overwrite, tell};
+use crate::output::{self, Overwrite, log};
 use crate::run::{FAILED, UNDECIDED};
 use crate::values::distance;
 use deltille::calibrate::{
@@ -79,7 +79,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         && check_same_board([&one, &other], [&first.calibrated_with, &second.calibrated_with])
             .is_err()
     {
-        tell!(
+        log!(
             "note: --assume-target: {one} and {other} were calibrated with different boards; comparing them unchanged"
         );
     }
@@ -101,7 +101,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let motions = CameraMotion::of_rig(&pairs);
     let mut text = String::new();
     for ((one, _), found) in pairs.iter().zip(&found) {
-        text += &told(one, found, args.tolerance);
+        text += &describe(one, found, args.tolerance);
     }
     for motion in &motions {
         // Writing to a String cannot fail.
@@ -204,7 +204,7 @@ fn files(
 }
 
 /// Describes how two cameras differ.
-fn told(camera: &CameraEstimate, found: &Comparison, tolerance: f64) -> String {
+fn describe(camera: &CameraEstimate, found: &Comparison, tolerance: f64) -> String {
     let name = match camera.name.as_str() {
         "" => String::new(),
         name => format!("{}: ", shown(name)),

@@ -14,7 +14,7 @@ use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::written::{check_places, sample_of, text_file};
 use crate::deltille::files::{camera_file, target_file};
 use crate::interrupt;
-use crate::output::{self, Overwrite, say, tell};
+use crate::output::{self, Overwrite, say, log};
 use crate::run::Interrupted;
 use crate::values::distance;
 use deltille::calibrate::{
@@ -116,7 +116,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let reference = Reference::Target(target);
     ensure!(
         !reference.is_loose(),
-        "--target: {} contains several loose boards; use the file of one of them",
+        "--target: the {} are loose boards; use the file of one of them",
         counted(target.panels.len(), "panel")
     );
     let sheet = args.sheet.read(&limits, &[target.identity()], std::slice::from_ref(&printing))?;
@@ -138,7 +138,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         counted(target.panels.len(), "panel")
     );
     let places = args.places()?;
-    interrupt::stands("the files written last are complete");
+    interrupt::set_status("the files written last are complete");
     let session = Watch {
         guide: match size {
             Some(size) => Some(args.guide(target, size, &intrinsics)?),
@@ -153,7 +153,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         limits,
         places,
         pictures: BTreeMap::new(),
-        told: BTreeSet::new(),
+        reported: BTreeSet::new(),
     };
     session.run()
 }
@@ -272,7 +272,7 @@ struct Watch<'a> {
     guide: Option<Guide>,
     pictures: BTreeMap<PathBuf, Picture>,
     /// Reported reasons of excluded views, while they remain excluded.
-    told: BTreeSet<String>,
+    reported: BTreeSet<String>,
 }
 
 impl Watch<'_> {
@@ -347,7 +347,7 @@ impl Watch<'_> {
                 if waited < GIVEN_UP {
                     return Ok(None);
                 }
-                tell!("error: {error}");
+                log!("error: {error}");
                 return Ok(Some(Seen::Nothing));
             }
         };
@@ -356,7 +356,7 @@ impl Watch<'_> {
         let corners: usize = labelled.map(|grid| grid.corners.len()).sum();
         if corners == 0 {
             let why = found.reasons.first().map_or(String::new(), |why| format!(": {why}"));
-            tell!("{show}: no board found{why}");
+            log!("{show}: no board found{why}");
             return Ok(Some(Seen::Nothing));
         }
         say!("{show}: {}", counted(corners, "corner"));
@@ -396,7 +396,7 @@ impl Watch<'_> {
             }
         };
         sightings::put_on(&self.sheet, Some(self.target), &mut shown.views)?;
-        out.extend(shown.left_out.iter().map(|(_, left)| told(left)));
+        out.extend(shown.left_out.iter().map(|(_, left)| excluded_line(left)));
         Ok((shown.views, out))
     }
 
@@ -432,9 +432,9 @@ impl Watch<'_> {
         let calibration = calibration.camera("camera", views, self.intrinsics.clone());
         let estimate = calibration.solve();
         if let Ok(estimate) = &estimate {
-            out.extend(estimate.excluded.iter().map(told));
+            out.extend(estimate.excluded.iter().map(excluded_line));
         }
-        self.tell_once(out);
+        self.report_once(out);
         let next = guide.next(count, estimate.as_ref().ok());
         let is_enough = next.is_enough(self.args.until);
         let views = counted(count, "view");
@@ -452,7 +452,7 @@ impl Watch<'_> {
             let folder = shown(&self.args.folder.display().to_string()).into_owned();
             say!("done: calibrate with the photographs in {folder}");
             if count < FEW {
-                tell!(
+                log!(
                     "{views} are few: the uncertainty of {} px assumes that the model fits, which only more views can show",
                     next.now_px.map_or(String::new(), |now| format!("{now:.4}"))
                 );
@@ -466,11 +466,11 @@ impl Watch<'_> {
     }
 
     /// Prints why views are excluded, once for as long as they remain excluded.
-    fn tell_once(&mut self, out: Vec<String>) {
-        for line in out.iter().filter(|line| !self.told.contains(*line)) {
-            tell!("{line}");
+    fn report_once(&mut self, out: Vec<String>) {
+        for line in out.iter().filter(|line| !self.reported.contains(*line)) {
+            log!("{line}");
         }
-        self.told = out.into_iter().collect();
+        self.reported = out.into_iter().collect();
     }
 
     /// Writes the requested files, each to a temporary path that is then renamed.
@@ -504,6 +504,6 @@ const ENOUGH_TO_TELL: usize = 3;
 /// wrong model shows in inconsistencies between views.
 const FEW: usize = 8;
 
-fn told(left_out: &Excluded) -> String {
+fn excluded_line(left_out: &Excluded) -> String {
     format!("{}: excluded: {}", left_out.view, left_out.reason)
 }

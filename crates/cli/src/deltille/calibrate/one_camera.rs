@@ -9,14 +9,14 @@ use anyhow::{Context, ensure};
 use super::report_page::check_images;
 use super::sightings::{Sightings, SightingsArgs};
 use super::solving::{
-    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out, sample, sureness,
+    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out, sample, projection_uncertainty,
     without_outliers,
 };
 use crate::deltille::files::camera_file;
 use crate::deltille::files::written::{
     File, check_places, same_file, sample_of, text_file, write_all,
 };
-use crate::output::{self, Overwrite, tell};
+use crate::output::{self, Overwrite, log};
 use crate::run::{FAILED, report};
 use crate::values::format;
 use deltille::calibrate::{CameraEstimate, Estimate, Intrinsics, Model, Source};
@@ -93,7 +93,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         camera_file::check_or_note(known, &known_with, targets, is_assumed)?;
     }
     for picture in &empty {
-        tell!("{}: excluded: no board found", picture.display());
+        log!("{}: excluded: no board found", picture.display());
     }
     if let Some(folder) = &args.images {
         check_images(folder, &views)?;
@@ -105,14 +105,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let listed = chosen(&tried);
     let mut solved = args.solve.solve(calibration, print, vec![tried])?;
-    unnamed.iter().for_each(|note| tell!("{note}"));
+    unnamed.iter().for_each(|note| log!("{note}"));
     ensure!(!solved.estimate.frames.is_empty(), "no view is consistent with this camera");
     let of_test = solved.estimate.held_out.iter().flat_map(|test| &test.excluded);
     for out in solved.estimate.excluded.iter().chain(of_test) {
-        tell!("{}: excluded: {}", out.view, out.reason);
+        log!("{}: excluded: {}", out.view, out.reason);
     }
     solved.estimate.excluded.splice(0..0, left_out);
-    if let Err(foreign) = solved.tell() {
+    if let Err(foreign) = solved.print_diagnoses() {
         let camera = args.fixed_intrinsics.as_deref().unwrap_or(Path::new(""));
         report(&foreign.context(format!("--fixed-intrinsics: {}", camera.display())));
         return Ok(ExitCode::from(FAILED));
@@ -180,7 +180,7 @@ impl Args {
         for format in &self.format {
             if file.failed.is_some() && !format.is_own() {
                 // Other programs would ignore the reason.
-                tell!(
+                log!(
                     "warning: --format {}: not written, because the calibration failed",
                     format.name()
                 );
@@ -237,7 +237,7 @@ fn of_camera(camera: &CameraEstimate) -> String {
             "spline of degree {degree} with {columns} × {rows} knots, {fov_x_deg}° across"
         );
     }
-    if let Some(line) = sureness(camera) {
+    if let Some(line) = projection_uncertainty(camera) {
         let _ = writeln!(text, "{line}");
     }
     // Correlations of neighbouring knots are not of interest.

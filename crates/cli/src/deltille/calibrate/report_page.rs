@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, ensure};
 
 use super::solving::Calibrated;
-use crate::output::{self, Overwrite, tell};
+use crate::output::{self, Overwrite, log};
 use deltille::calibrate::{View, ViewEstimate};
 use deltille::photograph;
 use deltille::raster::{AnyGray, Gray};
@@ -64,12 +64,12 @@ fn picture(image: &str, folder: &Path, size_px: [u32; 2]) -> Option<Gray<u8>> {
     let picture = match photograph::read(&path) {
         Ok(picture) => picture,
         Err(error) => {
-            tell!("warning: --images: {error}");
+            log!("warning: --images: {error}");
             return None;
         }
     };
     if [picture.width(), picture.height()] != size_px.map(|side| side as usize) {
-        tell!(
+        log!(
             "warning: --images: {} has {} × {} px, but the camera has {} × {}",
             path.display(),
             picture.width(),
@@ -96,10 +96,10 @@ pub fn check_images(folder: &Path, views: &[View]) -> anyhow::Result<()> {
     let missing = views.iter().filter(|view| picture_of(&view.image, folder).is_none());
     let missing: Vec<&str> = missing.map(|view| view.image.as_str()).collect();
     if let Some(first) = missing.first() {
-        tell!(
+        log!(
             "warning: --images: {} of {} are missing in {}, such as {first}",
             missing.len(),
-            counted(views.len(), "picture"),
+            counted(views.len(), "image"),
             folder.display()
         );
     }

@@ -9,7 +9,7 @@ use super::report_page::check_images;
 use super::sightings;
 use super::sightings::{GridArgs, SheetArgs};
 use super::solving::{
-    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out, sample, sureness,
+    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out, sample, projection_uncertainty,
     without_outliers,
 };
 use crate::deltille::files::limits::FileLimits;
@@ -17,7 +17,7 @@ use crate::deltille::files::written::{
     File, check_places, same_file, sample_of, text_file, write_all,
 };
 use crate::deltille::files::{camera_file, target_file};
-use crate::output::{Overwrite, check_folder, fixed, say, tell};
+use crate::output::{Overwrite, check_folder, fixed, say, log};
 use crate::run::{FAILED, report};
 use crate::values::format;
 use deltille::calibrate::{
@@ -154,13 +154,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut solved = args.solve.solve(calibration, print, tried)?;
     let detections = seen.iter().flat_map(|(_, detections)| detections);
     if let (Some(note), false) = (sightings::unnamed(detections, &reference), args.assume_target) {
-        tell!("{note}");
+        log!("{note}");
     }
     let of_test = solved.estimate.held_out.iter().flat_map(|test| &test.excluded);
     for out in solved.estimate.excluded.iter().chain(of_test) {
-        tell!("{}: excluded: {}", out.shown(), out.reason);
+        log!("{}: excluded: {}", out.shown(), out.reason);
     }
-    if let Err(foreign) = solved.tell() {
+    if let Err(foreign) = solved.print_diagnoses() {
         report(&foreign.context("--known"));
         return Ok(ExitCode::from(FAILED));
     }
@@ -238,7 +238,7 @@ impl Args {
         if failed.is_some() {
             // Only rig.json contains the reason of a failure.
             if !self.format.is_empty() || self.refine_target || found.map.is_some() {
-                tell!(
+                log!(
                     "warning: only rig.json and the cameras were written, because the calibration failed"
                 );
             }
@@ -381,7 +381,7 @@ fn summary(solved: &Calibrated) -> String {
             without_outliers(camera.outlier_count(), camera.inlier_rms_px()),
             at.to_array().map(|mm| fixed(mm, 2)).join(", ")
         ));
-        lines.extend(sureness(camera).map(|line| format!("{}: {line}", camera.name)));
+        lines.extend(projection_uncertainty(camera).map(|line| format!("{}: {line}", camera.name)));
     }
     for target in estimate.targets.iter().filter(|_| estimate.targets.len() > 1) {
         let at = target.scene_from_target.translation.to_array().map(|mm| fixed(mm, 2));

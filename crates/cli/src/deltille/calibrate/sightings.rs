@@ -8,7 +8,7 @@ use clap::ValueEnum;
 
 use crate::deltille::files::limits::FileLimits;
 use crate::deltille::files::{camera_file, detection_tables, target_file};
-use crate::output::tell;
+use crate::output::log;
 use crate::values::whole;
 use deltille::SheetUseError;
 use deltille::calibrate::{
@@ -213,7 +213,7 @@ pub fn take_sure(views: &mut Vec<View>, reference: &Reference) -> anyhow::Result
         is_any_sure || views.is_empty(),
         "--measure-target: none of {} shows all corners of the board; an untagged board must be fully visible to be \
          measured",
-        counted(views.len(), "picture")
+        counted(views.len(), "image")
     );
     let unsure = views.extract_if(.., |view| !reference.is_sure_of(view));
     Ok(unsure.map(|view| left_out(view, NOT_WHOLE)).collect())
@@ -227,7 +227,7 @@ pub fn take_known(views: &mut Vec<View>, reference: &Reference) -> Vec<Excluded>
 
 /// Reports an excluded view.
 fn left_out(view: View, why: &str) -> Excluded {
-    tell!("excluded: {}: {why}", view.name);
+    log!("excluded: {}: {why}", view.name);
     Excluded {
         camera: None,
         corners: view.corner_count(),
@@ -248,16 +248,16 @@ const NOT_WHOLE: &str =
 
 /// Returns the panel positions of the target, see [`Sheet::panels`].
 pub fn panels(reference: &Reference, sheet: &Sheet) -> anyhow::Result<Vec<PanelPlace>> {
-    sheet.panels(reference).map_err(told)
+    sheet.panels(reference).map_err(as_option_error)
 }
 
 /// Moves the corners of all views to their positions on the sheet, see [`Sheet::put_on`].
 pub fn put_on(sheet: &Sheet, target: Option<&Target>, views: &mut [View]) -> anyhow::Result<()> {
-    sheet.put_on(target, views).map_err(told)
+    sheet.put_on(target, views).map_err(as_option_error)
 }
 
 /// Describes an error of a sheet in terms of command-line options.
-fn told(error: SheetUseError) -> anyhow::Error {
+fn as_option_error(error: SheetUseError) -> anyhow::Error {
     match error {
         SheetUseError::Loose => anyhow!(
             "--target: loose boards in one file have no known relative pose; make a file for each board"
@@ -312,7 +312,7 @@ pub fn read(
         if let Some(one) =
             folder.and_then(|folder| files.iter().find(|file| file.parent() == Some(&folder)))
         {
-            tell!("excluded: {}: {} contains the same data", of_table[0].display(), one.display());
+            log!("excluded: {}: {} contains the same data", of_table[0].display(), one.display());
             continue;
         }
         for (name, found) in of_tables(&of_table, limits)? {
@@ -326,7 +326,7 @@ pub fn read(
             others => format!("; {others} more are duplicates"),
         };
         let (copy, first) = (copy.display(), first.display());
-        tell!("warning: {copy}: duplicate of {first}, counted once{others}");
+        log!("warning: {copy}: duplicate of {first}, counted once{others}");
     }
     if let Some(first) = foreign.first() {
         let count = counted(foreign.len(), "file");
@@ -335,14 +335,14 @@ pub fn read(
             "{}: no .json file contains a detection; run `deltille detect` first",
             first.parent().unwrap_or(first).display()
         );
-        tell!("excluded: {count} in the folder without a detection, such as {}", first.display());
+        log!("excluded: {count} in the folder without a detection, such as {}", first.display());
     }
     if is_assumed {
         assume(&mut detections, reference);
     }
     let Shown { views, empty, left_out, .. } = views(&detections, reference)?;
     for (index, out) in &left_out {
-        tell!("warning: excluded: {}: {}", files[*index].display(), out.reason);
+        log!("warning: excluded: {}: {}", files[*index].display(), out.reason);
     }
     ensure!(!views.is_empty(), nothing_shown(&detections));
     let empty = empty.into_iter().map(|index| files[index].clone()).collect();
@@ -363,7 +363,7 @@ fn assume(detections: &mut [(String, Detection)], reference: &Reference) {
     }
     for ([seen, own], count) in replaced {
         let detections = counted(count, "detection");
-        tell!("note: --assume-target: {detections} of {seen} are assigned to {own}");
+        log!("note: --assume-target: {detections} of {seen} are assigned to {own}");
     }
 }
 
@@ -376,7 +376,7 @@ fn nothing_shown(detections: &[(String, Detection)]) -> String {
             given.entry(kind).or_insert((0, why)).0 += 1;
         }
     }
-    let pictures = counted(detections.len(), "picture");
+    let pictures = counted(detections.len(), "image");
     let most = given.into_values().max_by_key(|(count, _)| *count);
     let why = most.map(|(count, why)| format!("; {count} of them: {why}")).unwrap_or_default();
     format!("no board of this kind found in {pictures}{why}")
@@ -412,9 +412,9 @@ fn ink_of(detections: &[(String, Detection)], reference: &Reference) -> Option<I
     let ink = InkEstimate::of_all(&found)?;
     let without = found.iter().filter(|ink| !ink.used).count();
     if ink.used && without > 0 {
-        tell!(
+        log!(
             "warning: {ink}, but {} of {} were detected without it; detect all images in one run",
-            counted(without, "picture"),
+            counted(without, "image"),
             found.len()
         );
     }
@@ -450,9 +450,9 @@ fn of_tables(files: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<(String, 
     let found: Vec<Detection> =
         pictures.into_iter().filter_map(|picture| picture.found.ok()).collect();
     if found.len() < all {
-        let unread = counted(all - found.len(), "picture");
+        let unread = counted(all - found.len(), "image");
         let folder = files[0].parent().unwrap_or(&files[0]);
-        tell!("excluded: {unread} of the tables in {} that could not be read", folder.display());
+        log!("excluded: {unread} of the tables in {} that could not be read", folder.display());
     }
     let stem = |image: &str| {
         let stem = Path::new(image).file_stem();

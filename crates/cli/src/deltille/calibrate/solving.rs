@@ -9,7 +9,7 @@ use anyhow::{Context, anyhow, bail, ensure};
 use clap::ValueEnum;
 
 use crate::deltille::files::written::{File, sample_of, text_file};
-use crate::output::{self, Overwrite, tell};
+use crate::output::{self, Overwrite, log};
 use crate::run::FAILED;
 use crate::values::{distance, whole};
 use deltille::calibrate::{
@@ -261,7 +261,7 @@ impl SolveArgs {
 
 impl Calibrated {
     /// Prints the diagnoses on standard error. Fails if the images were not taken by a fixed camera.
-    pub fn tell(&self) -> anyhow::Result<()> {
+    pub fn print_diagnoses(&self) -> anyhow::Result<()> {
         let words = Words::new(&self.estimate, self.print.scale);
         for diagnosis in &self.diagnoses {
             let text = words.sentence(diagnosis);
@@ -269,7 +269,7 @@ impl Calibrated {
                 bail!("{text}; nothing was written");
             }
             let kind = if diagnosis.is_failure() { "error" } else { "warning" };
-            tell!("{kind}: {text}");
+            log!("{kind}: {text}");
         }
         Ok(())
     }
@@ -292,7 +292,7 @@ impl Calibrated {
             return Vec::new();
         };
         if self.has_failed() {
-            tell!(
+            log!(
                 "warning: --measure-target: no target was written, because the calibration failed"
             );
             return Vec::new();
@@ -304,7 +304,7 @@ impl Calibrated {
 
     /// Describes the print and the sheet, one property per line.
     pub fn lines(&self) -> Vec<String> {
-        let shape = self.estimate.shape.as_ref().map(told);
+        let shape = self.estimate.shape.as_ref().map(describe_shape);
         let ink = self.print.ink.filter(|ink| ink.used);
         let ink = ink.map(|ink| format!("ink: {ink}; corners are corrected for it"));
         let views = self.estimate.views_of_a_corner();
@@ -317,7 +317,7 @@ impl Calibrated {
 /// incomplete.
 pub fn left_out(refused: &[FormatError]) -> Option<ExitCode> {
     for error in refused {
-        tell!("error: --format: {error}; skipped, all other files were written");
+        log!("error: --format: {error}; skipped, all other files were written");
     }
     (!refused.is_empty()).then(|| ExitCode::from(FAILED))
 }
@@ -332,23 +332,23 @@ fn accuracy(text: &str) -> Result<f64, String> {
 }
 
 /// Describes the projection uncertainty in the region of the corners; `None` if unknown.
-pub fn sureness(camera: &CameraEstimate) -> Option<String> {
+pub fn projection_uncertainty(camera: &CameraEstimate) -> Option<String> {
     let far = |mm: Option<f64>| mm.map_or("infinity".to_owned(), |mm| format!("{mm:.0} mm"));
     let distances = camera.projection.iter().flat_map(|known| &known.distances_mm);
     let distances = distances.map(|&mm| Some(mm)).chain([None]);
-    let told = distances.filter_map(|mm| {
+    let listed = distances.filter_map(|mm| {
         let noise = camera.projection_sd_px(mm, Source::Noise)?;
         let observed = camera.projection_sd_px(mm, Source::Observed);
         let observed = observed.map_or(String::new(), |sd| format!(", {sd:.4} px observed"));
         Some(format!("at {} {noise:.4} px from noise{observed}", far(mm)))
     });
-    let told: Vec<String> = told.collect();
+    let listed: Vec<String> = listed.collect();
     let observed = camera.projection.as_ref().and_then(|known| known.observed.as_ref());
     let board = match observed.is_some_and(|observed| observed.of_board.is_some()) {
         true => "; observed uncertainty includes errors of the board (--board-accuracy)",
         false => "",
     };
-    (!told.is_empty()).then(|| format!("projection uncertainty (1σ): {}{board}", told.join("; ")))
+    (!listed.is_empty()).then(|| format!("projection uncertainty (1σ): {}{board}", listed.join("; ")))
 }
 
 /// Returns a camera with nonzero values for all estimated parameters, to reject formats that cannot represent it
@@ -393,7 +393,7 @@ fn mapped(map: &TargetMap, views: usize) -> String {
 }
 
 /// Describes the shape of a sheet, and its significance.
-fn told(found: &BoardShape) -> String {
+fn describe_shape(found: &BoardShape) -> String {
     let significance = match found.is_significant() {
         true => "significant",
         false => "not significant: calibrate without --board-shape",

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow};
 
-use crate::output::tell;
+use crate::output::log;
 use deltille::camera::{Camera, CameraFile};
 use deltille::camera_file;
 use deltille::export::saved;
@@ -49,7 +49,7 @@ pub fn check_or_note(
                 [calibrated_with.first().cloned(), targets.first().map(Target::identity)].map(
                     |identity| identity.map_or(String::new(), |identity| identity.to_string()),
                 );
-            tell!(
+            log!(
                 "note: --assume-target: {} was made with {seen}, assumed to be {own}",
                 path.display()
             );
@@ -68,7 +68,7 @@ pub fn warn_if_failed(path: &Path, text: &str) -> Option<String> {
 
 fn warn_of(path: &Path, failure: Option<&str>) {
     if let Some(failure) = failure {
-        tell!("warning: {}: the calibration failed: {}", path.display(), shown(failure));
+        log!("warning: {}: the calibration failed: {}", path.display(), shown(failure));
     }
 }
 

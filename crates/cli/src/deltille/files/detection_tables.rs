@@ -8,7 +8,7 @@ use std::sync::{Mutex, MutexGuard};
 
 use anyhow::Context;
 
-use crate::output::{Overwrite, tell};
+use crate::output::{Overwrite, log};
 use deltille::export::kind::Kind;
 use deltille::export::staging::Staging;
 use deltille::export::tables::{CORNERS, EXTENSION, PICTURES, Picture, Writer, folder};
@@ -127,9 +127,9 @@ pub fn read(files: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<Picture>> 
     let read = folder::read(files, limits)?;
     if read.short > 0 {
         let have = if read.short == 1 { "has" } else { "have" };
-        tell!(
+        log!(
             "warning: {} {have} fewer corners than were detected",
-            counted(read.short, "picture")
+            counted(read.short, "image")
         );
     }
     Ok(read.pictures)

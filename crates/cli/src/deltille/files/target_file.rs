@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 
-use crate::output::tell;
+use crate::output::log;
 use deltille::detect::check_distinct;
 use deltille::family;
 use deltille::layout::Printing;
@@ -20,20 +20,20 @@ pub fn read(path: &Path, limits: &Limits) -> anyhow::Result<Printing> {
 /// Like [`read`], for commands that need poses; warns if a `.dsc` lacks the poses of its boards.
 pub fn read_placed(path: &Path, limits: &Limits) -> anyhow::Result<Printing> {
     let target = read(path, limits)?;
-    tell_missing(path, &target.target);
+    warn_if_poses_missing(path, &target.target);
     Ok(target)
 }
 
 /// Like [`read_placed`], for several files, see [`read_all`].
 pub fn read_all_placed(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<Printing>> {
     let targets = read_each(paths, limits)?;
-    paths.iter().zip(&targets).for_each(|(path, target)| tell_missing(path, &target.target));
+    paths.iter().zip(&targets).for_each(|(path, target)| warn_if_poses_missing(path, &target.target));
     Ok(targets)
 }
 
-fn tell_missing(path: &Path, target: &Target) {
+fn warn_if_poses_missing(path: &Path, target: &Target) {
     if let Some(missing) = target_file::without_poses(path, target) {
-        tell!("warning: {missing}");
+        log!("warning: {missing}");
     }
 }
 

@@ -7,7 +7,7 @@ use std::rc::Rc;
 use anyhow::{Context, anyhow, bail, ensure};
 
 use crate::interrupt;
-use crate::output::{self, Overwrite, tell};
+use crate::output::{self, Overwrite, log};
 use crate::run::{Interrupted, message};
 use deltille::artwork::Artwork;
 use deltille::export::kind::Kind;
@@ -136,7 +136,7 @@ impl<'a> Staged<'a> {
     /// Writes the files under temporary names.
     pub fn new(folder: &'a Path, files: &'a [File], overwrite: Overwrite) -> anyhow::Result<Self> {
         check_places(folder, files, overwrite)?;
-        interrupt::stands("nothing was written");
+        interrupt::set_status("nothing was written");
         let staging = Staging::new(folder).with_context(|| cannot_write_to(folder))?;
         let staged = staging.files();
         for file in files {
@@ -167,8 +167,8 @@ impl<'a> Staged<'a> {
             replaced.extend(textures_replaced(folder, &staged, &names));
         }
         staging.commit().with_context(|| cannot_write_to(folder))?;
-        interrupt::stands("the files are complete, but not all were verified");
-        replaced.iter().for_each(|line| tell!("{line}"));
+        interrupt::set_status("the files are complete, but not all were verified");
+        replaced.iter().for_each(|line| log!("{line}"));
         Ok(files.iter().map(|file| folder.join(&file.name)).collect())
     }
 }

@@ -8,7 +8,7 @@ use super::settings::board_settings::TAGS;
 use super::settings::meshes::PlateMeshes;
 use super::single_panel::{PrintingArgs, page};
 use crate::deltille::files::written::text_file;
-use crate::output::tell;
+use crate::output::log;
 use crate::values::{Grid, number, whole};
 use deltille::family;
 use deltille::layout::tag_range;
@@ -68,7 +68,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     files.extend(meshes);
     match spec.to_kalibr_yaml() {
         Some(yaml) => files.push(text_file(format!("{}.yaml", printing.target.name), yaml)),
-        None => tell!(
+        None => log!(
             "{}.yaml was not written: Kalibr supports only aprilTag36h11 tags with a border of 2 bits",
             printing.target.name
         ),

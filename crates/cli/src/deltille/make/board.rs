@@ -12,7 +12,7 @@ use super::settings::meshes::PlateMeshes;
 use super::settings::template::Template;
 use super::single_panel::idle_without_pages;
 use crate::deltille::files::written::{File, Formats, drawn, text_file};
-use crate::output::tell;
+use crate::output::log;
 use deltille::export::dsc;
 use deltille::family::{self, FamilyError, FamilyFileError, square_names};
 use deltille::lattice::GridKind;
@@ -72,7 +72,7 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
         && tags.spacing > 1
         && !tags.spacing.is_multiple_of(2)
     {
-        tell!(
+        log!(
             "warning: --tag-spacing {}: with an odd number, only every second of these squares has the \
              colour of the tags; with an even number, all of them have",
             tags.spacing
@@ -98,8 +98,8 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     let (meshes, texture) = meshes.files(target)?;
     files.extend(meshes);
     files.extend(laser.files(&printing)?);
-    let told = summary(&printing) + &texture;
-    let delivered = args.delivery.deliver(&printing, &files, &told)?;
+    let description = summary(&printing) + &texture;
+    let delivered = args.delivery.deliver(&printing, &files, &description)?;
     template.map_or(Ok(()), |template| template.write())?;
     Ok(delivered)
 }

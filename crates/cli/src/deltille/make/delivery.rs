@@ -10,7 +10,7 @@ use super::verify::{self, Proof};
 use crate::deltille::files::limits::FileLimits;
 use crate::deltille::files::target_file;
 use crate::deltille::files::written::{File, same_file, write_all};
-use crate::output::{self, Overwrite, Telling, say};
+use crate::output::{self, Overwrite, ResultFormat, say};
 use deltille::layout::Printing;
 use deltille::limits::Limits;
 use deltille::targets::Target;
@@ -47,7 +47,7 @@ pub struct Delivery {
     #[arg(long)]
     no_verify: bool,
     #[command(flatten)]
-    telling: Telling,
+    result_format: ResultFormat,
     #[command(flatten)]
     limits: FileLimits,
 }
@@ -81,7 +81,7 @@ impl Delivery {
     ) -> anyhow::Result<ExitCode> {
         let target = &printing.target;
         let written = write_all(&self.output, files, self.overwrite)?;
-        if !self.telling.is_json() {
+        if !self.result_format.is_json() {
             for line in summary.lines() {
                 say!("{line}");
             }
@@ -99,10 +99,10 @@ impl Delivery {
             .cloned()
             .collect();
         // No limits, because the files were just written.
-        let prove = || verify::prove(printing, &artifacts, false, self.telling, Limits::NONE);
+        let prove = || verify::prove(printing, &artifacts, false, self.result_format, Limits::NONE);
         let proof = (!self.no_verify && !artifacts.is_empty()).then(prove).transpose()?;
         let code = proof.as_ref().map_or(ExitCode::SUCCESS, Proof::code);
-        if self.telling.is_json() {
+        if self.result_format.is_json() {
             let name = &target.name;
             output::print_json(&Delivered {
                 schema: SCHEMA,
@@ -112,7 +112,7 @@ impl Delivery {
                 proof,
             })?;
         } else if let Some(proof) = proof {
-            proof.tell()?;
+            proof.print_summary()?;
         }
         Ok(code)
     }

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Context, bail, ensure};
 
 use crate::deltille::files::camera_file;
-use crate::output::{self, Telling, say};
+use crate::output::{self, ResultFormat, say};
 use crate::values::{distance, number};
 use deltille::family::{self, places};
 use deltille::lattice::GridKind;
@@ -52,7 +52,7 @@ pub struct Args {
     #[arg(long, value_name = "SIZE")]
     paper: Option<String>,
     #[command(flatten)]
-    telling: Telling,
+    result_format: ResultFormat,
 }
 
 /// Parses width and height, px.
@@ -143,7 +143,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         format!("deltille {command} --rows {rows} --cols {cols} --edge {edge_mm}mm{tags}{paper}");
     let to_mm = |tilt: f64| proposal.reach.labelled_to_mm(focal_px, tilt.to_radians());
     let patches_to_mm = |tilt: f64| proposal.patches_to_mm(focal_px, tilt.to_radians());
-    if args.telling.is_json() {
+    if args.result_format.is_json() {
         output::print_json(&serde_json::json!({
             "schema": "deltille/plan/1",
             "command": command,
@@ -159,11 +159,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }))?;
         return Ok(ExitCode::SUCCESS);
     }
-    tell(&situation, &proposal, &command)?;
+    print(&situation, &proposal, &command)?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn tell(situation: &Situation, proposal: &Proposal, command: &str) -> anyhow::Result<()> {
+fn print(situation: &Situation, proposal: &Proposal, command: &str) -> anyhow::Result<()> {
     let Situation { focal_px, size_px: [width, height], distances_mm: [near, far], .. } =
         *situation;
     let across = 2.0 * (f64::from(width) / 2.0 / focal_px).atan().to_degrees();
@@ -187,7 +187,7 @@ fn tell(situation: &Situation, proposal: &Proposal, command: &str) -> anyhow::Re
         counted(proposal.reach.tags, "tag"),
         shown(proposal.whole_from_mm)
     );
-    let told = |what: &str, to_mm: &dyn Fn(f64) -> Option<f64>| {
+    let reach = |what: &str, to_mm: &dyn Fn(f64) -> Option<f64>| {
         let to = TOLD_DEG.iter().filter_map(|&tilt| {
             let far = shown(to_mm(tilt.to_radians())?);
             Some(match tilt {
@@ -198,10 +198,10 @@ fn tell(situation: &Situation, proposal: &Proposal, command: &str) -> anyhow::Re
         let to: Vec<String> = to.collect();
         format!("{what} {}, in sharp images", to.join(", "))
     };
-    say!("{}", told("labelled", &|tilt| Some(proposal.reach.labelled_to_mm(focal_px, tilt))));
+    say!("{}", reach("labelled", &|tilt| Some(proposal.reach.labelled_to_mm(focal_px, tilt))));
     if is_dense(proposal) {
         let patches = |tilt| proposal.patches_to_mm(focal_px, tilt);
-        say!("{}", told("3 × 4 tiles of it", &patches));
+        say!("{}", reach("3 × 4 tiles of it", &patches));
     }
     Ok(())
 }

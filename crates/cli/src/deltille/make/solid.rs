@@ -194,8 +194,8 @@ fn run_with(
     files.extend(textured);
     files.extend(settings.laser.files(&printing)?);
     files.extend(pages(&settings, &printing)?);
-    let told = summary(target, &spec)? + &texture;
-    let delivered = args.delivery.deliver(&printing, &files, &told)?;
+    let description = summary(target, &spec)? + &texture;
+    let delivered = args.delivery.deliver(&printing, &files, &description)?;
     template.map_or(Ok(()), |template| template.write())?;
     Ok(delivered)
 }

@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::deltille::files::limits::AllLimits;
 use crate::deltille::files::target_file;
 use crate::deltille::files::written::same_file;
-use crate::output::{self, Overwrite, Telling, say, tell};
+use crate::output::{self, Overwrite, ResultFormat, say, log};
 use crate::run::{self, FAILED};
 use crate::{interrupt, progress};
 use deltille::export::kind::Kind;
@@ -36,7 +36,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
     #[command(flatten)]
-    telling: Telling,
+    result_format: ResultFormat,
     #[command(flatten)]
     limits: AllLimits,
     #[command(flatten)]
@@ -71,15 +71,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         args.overwrite.check(path, &Kind::of_schema(SCHEMA)).context("--report")?;
         output::check_writable("--report", path)?;
     }
-    interrupt::stands("not all files were verified");
-    let proof = prove(&printing, &artifacts, alone, args.telling, limits)?;
+    interrupt::set_status("not all files were verified");
+    let proof = prove(&printing, &artifacts, alone, args.result_format, limits)?;
     if let Some(path) = &args.report {
         let json = serde_json::to_string_pretty(&proof).context("--report")? + "\n";
         output::write(path, json.as_bytes(), args.overwrite).context("--report")?;
     }
-    match args.telling.is_json() {
+    match args.result_format.is_json() {
         true => output::print_json(&proof)?,
-        false => proof.tell()?,
+        false => proof.print_summary()?,
     }
     Ok(proof.code())
 }
@@ -93,7 +93,7 @@ pub fn prove(
     printing: &Printing,
     artifacts: &[PathBuf],
     alone: bool,
-    telling: Telling,
+    result_format: ResultFormat,
     limits: Limits,
 ) -> anyhow::Result<Proof> {
     let bar = progress::bar(1, "");
@@ -118,7 +118,7 @@ pub fn prove(
         let verdict = verifier.verify_path(path);
         bar.finish_and_clear();
         match verdict {
-            Ok(verdict) => proof.add(verdict, telling)?,
+            Ok(verdict) => proof.add(verdict, result_format)?,
             Err(error) if interrupt::is_raised() => return Err(error.into()),
             // The remaining files are still verified.
             Err(error) => {
@@ -134,7 +134,7 @@ pub fn prove(
         }
     }
     for verdict in verifier.left_out(artifacts, alone) {
-        proof.add(verdict, telling)?;
+        proof.add(verdict, result_format)?;
     }
     Ok(proof)
 }
@@ -160,7 +160,7 @@ fn artifacts_beside(folder: &Path, printing: &Printing) -> Vec<PathBuf> {
     let meshes = meshes.into_iter().chain(more).filter_map(present);
     if printing.sheets.is_empty() {
         for path in printed {
-            tell!(
+            log!(
                 "{}: not verified, because the description of {name} has no paper layout: print it again, or remove the \
                  file",
                 path.display()
@@ -169,7 +169,7 @@ fn artifacts_beside(folder: &Path, printing: &Printing) -> Vec<PathBuf> {
         return meshes.collect();
     }
     for path in pages_too_many(folder, printing) {
-        tell!(
+        log!(
             "{}: not verified, because {name} has {}: remove or rename the file",
             path.display(),
             counted(count, "page")
@@ -230,8 +230,8 @@ impl Proof {
         Self { schema: SCHEMA, target, passed: true, artifacts: Vec::new(), errors: Vec::new() }
     }
 
-    fn add(&mut self, verdict: Verdict, telling: Telling) -> anyhow::Result<()> {
-        if !telling.is_json() {
+    fn add(&mut self, verdict: Verdict, result_format: ResultFormat) -> anyhow::Result<()> {
+        if !result_format.is_json() {
             say!("{verdict}");
         }
         self.passed &= verdict.passed;
@@ -240,7 +240,7 @@ impl Proof {
     }
 
     /// Prints a summary; files that could not be verified have already been reported.
-    pub fn tell(&self) -> anyhow::Result<()> {
+    pub fn print_summary(&self) -> anyhow::Result<()> {
         let Self { target, artifacts, .. } = self;
         let files = counted(artifacts.len(), "file");
         match artifacts.iter().filter(|verdict| !verdict.passed).count() {

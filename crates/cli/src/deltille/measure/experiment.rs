@@ -176,7 +176,7 @@ struct SimulationArgs {
 
 /// Runs an experiment; nothing is written if it is interrupted.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    interrupt::stands("no result was written");
+    interrupt::set_status("no result was written");
     match args.experiment {
         Experiment::Corners(args) => run_corners(args),
         Experiment::Guide(args) => run_guide(args),
@@ -235,7 +235,7 @@ fn run_rig(args: RigArgs) -> anyhow::Result<ExitCode> {
     let setup = rig::Setup { width, frames: frames as usize, seed: simulation.seed };
     let pictures = rig::Object::ALL.len() * rig::CAMERAS * setup.frames;
     let outcomes =
-        simulation.run(pictures, "pictures", |tick| rig::run(setup, interrupt::flag(), tick))?;
+        simulation.run(pictures, "images", |tick| rig::run(setup, interrupt::flag(), tick))?;
     let Some(outcomes) = outcomes? else {
         return Err(Interrupted("nothing was written".to_owned()).into());
     };

@@ -12,7 +12,7 @@ use super::detector_options::FinderArgs;
 use crate::deltille::files::detection_tables::{self, Tables};
 use crate::deltille::files::images::{self, Images, Stems};
 use crate::deltille::files::images_at_once;
-use crate::output::{self, Overwrite, tell};
+use crate::output::{self, Overwrite, log};
 use crate::run::{self, BAD_INPUT, FAILED, Interrupted};
 use crate::values::{format, whole};
 use crate::{interrupt, progress};
@@ -189,7 +189,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     seen.sort_unstable_by_key(|seen| seen.index);
     let mut again = None;
     if args.stream {
-        tell_ink_of_all(&detector, &seen);
+        note_ink_of_all(&detector, &seen);
     } else if !interrupt::is_raised() {
         let unseen = unseen.into_inner().expect("no thread panics here");
         again = see_again(&args, &targets, &detector, &seen, unseen, &threads, &report)?;
@@ -209,17 +209,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let _ = fs::remove_dir(folder);
     }
     if interrupt::is_raised() {
-        return Err(Interrupted(report.standing()).into());
+        return Err(Interrupted(report.status()).into());
     }
     report.end()
 }
 
 /// Notes that each image used its own ink estimate, and that the joint estimate gives different corners.
-fn tell_ink_of_all(detector: &Detector, seen: &[Seen]) {
+fn note_ink_of_all(detector: &Detector, seen: &[Seen]) {
     let found: Vec<Option<InkEstimate>> = seen.iter().map(|seen| seen.ink).collect();
     if let Some(ink) = detector.ink_of_all(&found) {
         let images = counted(ink.pictures as usize, "image");
-        tell!(
+        log!(
             "note: --stream used a separate ink estimate for each image; without it, corners are located with the \
              joint estimate, {ink} ({images}), and differ slightly"
         );
@@ -268,7 +268,7 @@ fn see_again(
         });
         bar.finish_and_clear();
     }
-    tell!("ink: {ink} ({})", counted(ink.pictures as usize, "image"));
+    log!("ink: {ink} ({})", counted(ink.pictures as usize, "image"));
     Ok(tables)
 }
 
@@ -308,21 +308,21 @@ struct State {
 impl Report {
     fn new(single: bool, go_on: &'static str) -> Self {
         let report = Self { single, go_on, state: Mutex::default() };
-        interrupt::stands(report.standing());
+        interrupt::set_status(report.status());
         report
     }
 
     /// Describes the progress so far.
-    fn standing(&self) -> String {
+    fn status(&self) -> String {
         format!("{} images done{}", self.done(), self.go_on)
     }
 
     fn add(&self, index: usize, result: anyhow::Result<Outcome>) {
-        self.tell(index, result);
-        interrupt::stands(self.standing());
+        self.print(index, result);
+        interrupt::set_status(self.status());
     }
 
-    fn tell(&self, index: usize, result: anyhow::Result<Outcome>) {
+    fn print(&self, index: usize, result: anyhow::Result<Outcome>) {
         let mut state = self.state.lock().expect("no thread panics here");
         state.waiting.insert(index, result);
         loop {
@@ -368,13 +368,13 @@ impl Report {
             return Err(error);
         }
         if skipped > 0 {
-            tell!("{skipped} of {all} images skipped, because they already have results");
+            log!("{skipped} of {all} images skipped, because they already have results");
         }
         if failed == 0 {
             let nothing = found == 0 && skipped == 0;
             return Ok(if nothing { ExitCode::from(FAILED) } else { ExitCode::SUCCESS });
         }
-        tell!("error: {failed} of {all} images failed");
+        log!("error: {failed} of {all} images failed");
         Ok(ExitCode::from(if failed == all { BAD_INPUT } else { FAILED }))
     }
 }

@@ -10,7 +10,7 @@ use image::{DynamicImage, ImageBuffer, Luma};
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::written::{bytes_file, text_file, write_all};
 use crate::deltille::files::{camera_file, target_file};
-use crate::output::{self, Overwrite, say, tell};
+use crate::output::{self, Overwrite, say, log};
 use crate::values::number;
 use deltille::camera::{Camera, Pose};
 use deltille::export::kind::signed_png;
@@ -121,7 +121,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let first = target.panels.first();
         let is_away = first.is_some_and(|panel| panel.pose.matrix().z_axis.z < 0.0);
         let side = if is_away { "z < 0" } else { "z > 0" };
-        tell!(
+        log!(
             "warning: the target is behind the camera, out of view, or seen from its back: --eye looks at the \
              middle of the target, and a board faces the side of {side}"
         );

@@ -173,7 +173,7 @@ impl Meshes {
         let mut meshing = Meshing::default();
         meshing.plate_mm = plate_mm.unwrap_or(meshing.plate_mm);
         meshing.inlay_mm = length("inlay", &self.inlay)?.unwrap_or(meshing.inlay_mm);
-        let (mut files, told) = match self.is_textured() {
+        let (mut files, description) = match self.is_textured() {
             true => self.textured(target, meshing)?,
             false => (Vec::new(), String::new()),
         };
@@ -187,7 +187,7 @@ impl Meshes {
                 files.extend(skeleton.map(|(name, bytes)| bytes_file(name, bytes)));
             }
         }
-        Ok((files, told))
+        Ok((files, description))
     }
 
     /// Returns the requested textured files, and a line about the texture.
@@ -214,12 +214,12 @@ impl Meshes {
         let files: BTreeMap<String, Vec<u8>> =
             self.textured_formats().flat_map(|what| of_mesh(&mesh, what)).collect();
         let files = files.into_iter().map(|(name, bytes)| bytes_file(name, bytes)).collect();
-        Ok((files, told(&mesh)))
+        Ok((files, describe(&mesh)))
     }
 }
 
 /// Describes the textures of a mesh in one line.
-fn told(mesh: &TexturedMesh) -> String {
+fn describe(mesh: &TexturedMesh) -> String {
     let sizes = || mesh.textures.iter().map(|texture| texture.size_px);
     let [width, height] = [0, 1].map(|axis| sizes().map(|size| size[axis]).max().unwrap_or(0));
     let texels = mesh.texels_per_bit;
