@@ -139,13 +139,13 @@ fn images_of_the_most_common_size_count_once_each() {
         std::fs::write(at.join(format!("photos/c{index}.png")), &png).unwrap();
     }
     let output = deltille(at, command).success().get_output().clone();
-    assert!(said(&output).contains("\n4 views: projections are known"), "{}", said(&output));
+    assert!(said(&output).contains("\n4 views: projection uncertainty"), "{}", said(&output));
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert!(
         stderr.contains("b0.png: excluded: it has 512 × 384 pixels, but most images have 1024 × 768"),
         "{stderr}"
     );
-    assert!(stderr.contains("c3: left out: it is a copy of the image of b3"), "{stderr}");
+    assert!(stderr.contains("c3: excluded: it is a copy of the image of b3"), "{stderr}");
 }
 
 /// An image reduced by a whole number.

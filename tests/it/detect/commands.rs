@@ -177,7 +177,7 @@ fn a_benchmark_reports_every_stage() {
     let folder = board();
     let result = deltille(folder.path(), "bench detect --target board.json sheet --repeat 2");
     let said = String::from_utf8(result.success().get_output().stdout.clone()).unwrap();
-    assert!(said.starts_with("1 images, 3.87 Mpx and 42.0 corners each"), "{said}");
+    assert!(said.starts_with("1 images, 3.87 Mpx and 42.0 corners on average"), "{said}");
     for stage in ["pyramid", "coarse", "refine", "all"] {
         assert!(said.contains(&format!("\n{stage} ")), "{said}");
     }
@@ -278,7 +278,7 @@ fn a_stream_notes_that_files_would_have_other_corners() {
     };
     let (lines, notes) = detect("*.png", "--stream");
     assert!(
-        notes.contains("note: --stream located the corners of each image with the ink"),
+        notes.contains("note: --stream used a separate ink estimate for each image"),
         "{notes}"
     );
     assert!(lines.lines().all(|line| line.contains("\"pictures\": 1}")));

@@ -252,7 +252,7 @@ fn a_resumed_run_extends_its_tables_and_keeps_unreadable_ones() {
     std::fs::write(at("out/pictures.parquet"), b"PAR1 of somebody PAR1").unwrap();
     let said = run(detect).code(2);
     let said = String::from_utf8_lossy(&said.get_output().stderr).into_owned();
-    assert!(said.contains("pictures.parquet holds a Parquet, which would be lost"), "{said}");
+    assert!(said.contains("pictures.parquet contains a Parquet, which would be lost"), "{said}");
 }
 
 fn read(folder: &Path) -> Vec<Picture> {

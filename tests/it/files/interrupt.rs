@@ -139,7 +139,7 @@ fn an_interrupted_best_search_keeps_the_best_so_far() {
         let output = interrupt(child);
         let (code, stderr) = (output.status.code(), text(&output.stderr));
         let said: Vec<&str> =
-            stderr.lines().filter(|line| !line.starts_with("starts from")).collect();
+            stderr.lines().filter(|line| !line.starts_with("starting from")).collect();
         assert!(said.len() == 1 && said[0].starts_with("interrupted: "), "{stderr}");
         assert_eq!(stderr.lines().count(), 1 + usize::from(from.is_none()), "{stderr}");
         if code == Some(0) {

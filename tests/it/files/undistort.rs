@@ -67,7 +67,7 @@ fn a_view_keeps_what_is_known_of_the_calibration_of_its_camera() {
     )
     .code(2);
     let said = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
-    assert!(said.contains("its calibration failed: it left 90 px"), "{said}");
+    assert!(said.contains("the calibration failed: it left 90 px"), "{said}");
     let view = read(folder.path().join("new/camera-undistorted.yaml"));
     assert_eq!((view.calibrated_with, view.failed), (file.calibrated_with, file.failed));
 }
@@ -81,8 +81,8 @@ fn what_cannot_be_shown_is_refused_in_a_line() {
         assert!(said.contains(words) && said.trim().lines().count() == 1, "{args}: {said}");
     };
     refused("undistort --camera camera.yaml --field 180deg", "less than 180°");
-    refused("undistort --camera camera.yaml --field wide", "give inside, whole");
-    refused("undistort --camera camera.yaml --size 10", "no width and height");
+    refused("undistort --camera camera.yaml --field wide", "expected inside, whole");
+    refused("undistort --camera camera.yaml --size 10", "not a valid width and height");
     refused("undistort --camera camera.yaml --size 60000x60000", "--max-pixels");
     refused("undistort --camera none.yaml", "none.yaml");
     refused("rectify camera.yaml --pair a,b", "camera.yaml");

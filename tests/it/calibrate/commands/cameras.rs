@@ -183,7 +183,7 @@ fn images_without_a_board_are_reported_with_the_most_common_reason() {
     ];
     let folder = folder(&board(8, 9), &empty);
     let why =
-        "no board of this kind found in 4 pictures; 2 of them: 1 tag not on the target, for example id 4";
+        "no board of this kind found in 4 images; 2 of them: 1 tag not on the target, for example id 4";
     refused(folder.path(), CALIBRATE, &[why]);
     std::fs::create_dir(folder.path().join("b")).unwrap();
     let rig = "rig --camera a=corners --camera b=b --target board.json";
@@ -397,7 +397,7 @@ fn a_comparison_without_uncertainties_is_undecided() {
     {
         let (code, stdout) = code(&format!("compare {args} --region image -o said.json"));
         assert_eq!(code, Some(3), "{stdout}");
-        assert!(stdout.contains("cannot judge whether the camera has changed"), "{stdout}");
+        assert!(stdout.contains("cannot determine whether the camera has changed"), "{stdout}");
         let which = format!("{which} calibration");
         assert!(stdout.contains(&which), "{stdout}");
         let said = json(&at.join("said.json"));

@@ -249,7 +249,7 @@ fn describe(camera: &CameraEstimate, found: &Comparison, tolerance: f64) -> Stri
          {:.4}°{moved}\n{expected}",
         found.rms_px,
         found.largest_px(),
-        counted(found.compared().count(), "place"),
+        counted(found.compared().count(), "point"),
         turn.length().to_degrees()
     )
 }
