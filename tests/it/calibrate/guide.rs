@@ -142,7 +142,8 @@ fn images_of_the_most_common_size_count_once_each() {
     assert!(said(&output).contains("\n4 views: projection uncertainty"), "{}", said(&output));
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert!(
-        stderr.contains("b0.png: excluded: it has 512 × 384 pixels, but most images have 1024 × 768"),
+        stderr
+            .contains("b0.png: excluded: it has 512 × 384 pixels, but most images have 1024 × 768"),
         "{stderr}"
     );
     assert!(stderr.contains("c3: excluded: it is a copy of the image of b3"), "{stderr}");

@@ -60,7 +60,10 @@ fn a_new_folder_with_the_name_of_a_file_is_refused() {
     }
     refused("undistort --camera c.yaml -o /dev/full", "-o: /dev/full");
     let pose = "pose none.png --target b.json --camera c.yaml -o /dev/full";
-    refused(pose, "-o /dev/full is not a folder; expected a folder, or a file that ends in .ndjson");
+    refused(
+        pose,
+        "-o /dev/full is not a folder; expected a folder, or a file that ends in .ndjson",
+    );
     assert_eq!(names(at), before);
     // Where it is there as a folder, it is meant.
     std::fs::create_dir(at.join("out.json")).unwrap();

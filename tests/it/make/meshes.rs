@@ -68,7 +68,10 @@ fn faces_are_shared_among_textures() {
     let again = "tetrahedron --edge 100mm --tiles 6 --name each --obj --textures 3 --no-verify";
     let said = deltille(at, again).success();
     let said = String::from_utf8(said.get_output().stderr.clone()).unwrap();
-    assert!(said.contains("each-texture-4.png, ") && said.contains("each.xml: these use other textures"));
+    assert!(
+        said.contains("each-texture-4.png, ")
+            && said.contains("each.xml: these use other textures")
+    );
     let said = deltille(at, again).success();
     let said = String::from_utf8(said.get_output().stderr.clone()).unwrap();
     assert!(said.contains("each-texture-4.png, "), "{said}");

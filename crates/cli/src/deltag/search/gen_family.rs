@@ -15,7 +15,7 @@ use super::rules::RuleArgs;
 use crate::deltag::about::verify_family::proof_of;
 use crate::deltag::named::resolve;
 use crate::interrupt;
-use crate::output::{self, Overwrite, say, log};
+use crate::output::{self, Overwrite, log, say};
 use crate::progress::SearchProgress;
 use crate::run::FAILED;
 use crate::values::{name, number, whole};

@@ -10,7 +10,7 @@ use crate::deltille::calibrate::sightings::{GridArgs, SheetArgs};
 use crate::deltille::files::images::Images;
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::{camera_file, target_file};
-use crate::output::{self, Overwrite, say, log};
+use crate::output::{self, Overwrite, log, say};
 use crate::run::FAILED;
 use deltille::calibrate::{Calibration, Diagnosis, Estimate, Reference, Words, views};
 use deltille::camera::Camera;

@@ -14,7 +14,7 @@ use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::written::{check_places, sample_of, text_file};
 use crate::deltille::files::{camera_file, target_file};
 use crate::interrupt;
-use crate::output::{self, Overwrite, say, log};
+use crate::output::{self, Overwrite, log, say};
 use crate::run::Interrupted;
 use crate::values::distance;
 use deltille::calibrate::{

@@ -9,8 +9,8 @@ use anyhow::{Context, ensure};
 use super::report_page::check_images;
 use super::sightings::{Sightings, SightingsArgs};
 use super::solving::{
-    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out, sample, projection_uncertainty,
-    without_outliers,
+    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out,
+    projection_uncertainty, sample, without_outliers,
 };
 use crate::deltille::files::camera_file;
 use crate::deltille::files::written::{
@@ -37,7 +37,7 @@ pub struct Args {
     sightings: SightingsArgs,
     /// The camera model.
     #[arg(long, required_unless_present = "fixed_intrinsics", help = format!(
-        "Camera model, beside fx, fy, cx, cy: {}, which fixes fx, fy, cx, cy; auto selects the model with the lowest \
+        "Camera model to estimate with fx, fy, cx, cy: {}, which fixes fx, fy, cx, cy; auto selects the model with the lowest \
          error on held-out views",
         Model::choice()
     ))]

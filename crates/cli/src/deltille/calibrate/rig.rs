@@ -9,15 +9,15 @@ use super::report_page::check_images;
 use super::sightings;
 use super::sightings::{GridArgs, SheetArgs};
 use super::solving::{
-    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out, sample, projection_uncertainty,
-    without_outliers,
+    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out,
+    projection_uncertainty, sample, without_outliers,
 };
 use crate::deltille::files::limits::FileLimits;
 use crate::deltille::files::written::{
     File, check_places, same_file, sample_of, text_file, write_all,
 };
 use crate::deltille::files::{camera_file, target_file};
-use crate::output::{Overwrite, check_folder, fixed, say, log};
+use crate::output::{Overwrite, check_folder, fixed, log, say};
 use crate::run::{FAILED, report};
 use crate::values::format;
 use deltille::calibrate::{

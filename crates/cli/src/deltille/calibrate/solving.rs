@@ -142,13 +142,13 @@ pub fn chosen(tried: &[Candidate]) -> String {
     if tried.is_empty() {
         return String::new();
     }
-    let mut text = "model            parameters  held out px\n".to_owned();
+    let mut text = "model            parameters  held-out px\n".to_owned();
     for candidate in tried {
         let held_out =
             candidate.held_out_px.map_or("did not converge".to_owned(), |px| format!("{px:.4}"));
         let note = match (candidate.chosen, candidate.holds) {
-            (true, _) => "  taken",
-            (_, true) => "  as good",
+            (true, _) => "  selected",
+            (_, true) => "  equally good",
             _ if candidate.held_out_px.is_some() && !candidate.is_stable => "  ill-conditioned",
             _ => "",
         };
@@ -348,7 +348,8 @@ pub fn projection_uncertainty(camera: &CameraEstimate) -> Option<String> {
         true => "; observed uncertainty includes errors of the board (--board-accuracy)",
         false => "",
     };
-    (!listed.is_empty()).then(|| format!("projection uncertainty (1σ): {}{board}", listed.join("; ")))
+    (!listed.is_empty())
+        .then(|| format!("projection uncertainty (1σ): {}{board}", listed.join("; ")))
 }
 
 /// Returns a camera with nonzero values for all estimated parameters, to reject formats that cannot represent it

@@ -127,10 +127,7 @@ pub fn read(files: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<Picture>> 
     let read = folder::read(files, limits)?;
     if read.short > 0 {
         let have = if read.short == 1 { "has" } else { "have" };
-        log!(
-            "warning: {} {have} fewer corners than were detected",
-            counted(read.short, "image")
-        );
+        log!("warning: {} {have} fewer corners than were detected", counted(read.short, "image"));
     }
     Ok(read.pictures)
 }

@@ -27,7 +27,10 @@ pub fn read_placed(path: &Path, limits: &Limits) -> anyhow::Result<Printing> {
 /// Like [`read_placed`], for several files, see [`read_all`].
 pub fn read_all_placed(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<Printing>> {
     let targets = read_each(paths, limits)?;
-    paths.iter().zip(&targets).for_each(|(path, target)| warn_if_poses_missing(path, &target.target));
+    paths
+        .iter()
+        .zip(&targets)
+        .for_each(|(path, target)| warn_if_poses_missing(path, &target.target));
     Ok(targets)
 }
 

@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::deltille::files::limits::AllLimits;
 use crate::deltille::files::target_file;
 use crate::deltille::files::written::same_file;
-use crate::output::{self, Overwrite, ResultFormat, say, log};
+use crate::output::{self, Overwrite, ResultFormat, log, say};
 use crate::run::{self, FAILED};
 use crate::{interrupt, progress};
 use deltille::export::kind::Kind;

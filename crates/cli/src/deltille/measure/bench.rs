@@ -35,7 +35,7 @@ struct DetectArgs {
     images: Vec<PathBuf>,
     #[command(flatten)]
     finder: FinderArgs,
-    /// Number of detections per image, of which the fastest counts; slower runs were disturbed by other processes
+    /// Number of detections per image; the fastest counts, because other processes slow the rest
     #[arg(long, value_name = "N", default_value_t = 5,
           value_parser = whole(1..=1000u32))]
     repeat: u32,

@@ -10,7 +10,7 @@ use image::{DynamicImage, ImageBuffer, Luma};
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::written::{bytes_file, text_file, write_all};
 use crate::deltille::files::{camera_file, target_file};
-use crate::output::{self, Overwrite, say, log};
+use crate::output::{self, Overwrite, log, say};
 use crate::values::number;
 use deltille::camera::{Camera, Pose};
 use deltille::export::kind::signed_png;

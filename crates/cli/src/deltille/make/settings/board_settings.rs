@@ -1,6 +1,6 @@
 //! Settings of `deltille board` and `deltille checkerboard`, both as options and as a TOML template.
 
-#![allow(rustdoc::invalid_html_tags)] // The comments on options are the help of the program, too.
+#![allow(rustdoc::invalid_html_tags)] // Option comments are help texts.
 
 use std::ops::RangeInclusive;
 use std::path::Path;
@@ -83,7 +83,7 @@ pub struct BoardSettings {
     /// Id of the first tag; the others follow [default: 0]
     #[arg(long, help_heading = TAGS, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     first_id: Option<u32>,
-    /// Print the id of each tag beside it in small type
+    /// Print the id of each tag next to it in small type
     #[arg(long, help_heading = TAGS)]
     #[serde(skip_serializing_if = "is_false")]
     tag_ids: bool,
@@ -147,7 +147,7 @@ pub struct BoardSettings {
     /// Resolution of the PNG, 200 to 2400 dots per inch [default: 300]
     #[arg(long, help_heading = PRINT, allow_negative_numbers = true, value_parser = whole(DPI))]
     dpi: Option<u32>,
-    /// Text for the label of every sheet, beside the name, such as the owner
+    /// Text for the label of every sheet, next to the name, such as the owner
     #[arg(long, value_name = "TEXT")]
     note: Option<String>,
     /// SVG logo, printed in black opposite the label: filled paths and strokes; white is paper

@@ -1,6 +1,6 @@
 //! Finishing options of boards: mirror images, spot colours, laser drawings.
 
-#![allow(rustdoc::invalid_html_tags)] // The comments on options are the help of the program, too.
+#![allow(rustdoc::invalid_html_tags)] // Option comments are help texts.
 
 use anyhow::{Context, bail};
 use serde::{Deserialize, Serialize};

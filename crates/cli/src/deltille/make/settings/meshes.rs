@@ -1,6 +1,6 @@
 //! Mesh options of all commands that make targets, and the mesh files.
 
-#![allow(rustdoc::invalid_html_tags)] // The comments on options are the help of the program, too.
+#![allow(rustdoc::invalid_html_tags)] // Option comments are help texts.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;

@@ -1,6 +1,6 @@
 //! Settings of the commands that make solids, both as options and as a TOML template.
 
-#![allow(rustdoc::invalid_html_tags)] // The comments on options are the help of the program, too.
+#![allow(rustdoc::invalid_html_tags)] // Option comments are help texts.
 
 use std::path::{Path, PathBuf};
 
@@ -85,7 +85,7 @@ pub struct SolidSettings {
     /// Id of the first tag; the others follow, face by face [default: 0]
     #[arg(long, help_heading = TAGS, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     pub first_id: Option<u32>,
-    /// Print the id of each tag beside it in small type
+    /// Print the id of each tag next to it in small type
     #[arg(long, help_heading = TAGS)]
     #[serde(skip_serializing_if = "is_false")]
     pub tag_ids: bool,
@@ -162,7 +162,7 @@ pub struct SolidSettings {
     /// Blank margin along the edges of the paper [default: 5mm]
     #[arg(long, help_heading = PAPER, value_name = "LENGTH", allow_hyphen_values = true)]
     pub margin: Option<String>,
-    /// Text for the label of every sheet, beside the name, such as the owner
+    /// Text for the label of every sheet, next to the name, such as the owner
     #[arg(long, value_name = "TEXT")]
     pub note: Option<String>,
     /// SVG logo, printed in black opposite the label: filled paths and strokes; white is paper
