@@ -173,7 +173,7 @@ fn a_template_keeps_the_logo_and_unprintable_logos_are_rejected_in_one_line() {
             "--logo-height: a logo 90 mm high does not fit beside the other marks",
         ),
         ("--logo-height 9mm", "--logo-height: needs a logo: add --logo"),
-        ("--logo logo.svg --gltf", "--logo: it says nothing without --pdf, --svg or --png"),
+        ("--logo logo.svg --gltf", "--logo needs --pdf, --svg or --png"),
     ] {
         let said = deltille(folder.path(), &format!("{board} {args} -o refused")).code(2);
         let said = String::from_utf8(said.get_output().stderr.clone()).unwrap();

@@ -175,8 +175,8 @@ fn options_override_the_meshes_lasers_and_inks_of_a_template() {
             "--texture-dpi: 0 is not between",
         ),
         ("rows = 4\ncols = 5\n[laser]\nformats = [\"dxf\"]\nkerf = \"much\"\n", "--kerf: "),
-        ("rows = 4\ncols = 5\n[laser]\nkerf = \"1mm\"\n", "--kerf: it says nothing without"),
-        ("rows = 4\ncols = 5\nplate = \"3mm\"\n", "--plate: it says nothing without"),
+        ("rows = 4\ncols = 5\n[laser]\nkerf = \"1mm\"\n", "--kerf needs"),
+        ("rows = 4\ncols = 5\nplate = \"3mm\"\n", "--plate needs"),
         ("rows = 4\ncols = 5\n[finishing]\nwhite = \"Black\"\n", "--white: `Black`"),
         ("rows = 4\n[plate]\nmm = 3\n", "line 2, `plate`: an object"),
         (
