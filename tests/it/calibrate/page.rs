@@ -87,15 +87,15 @@ fn the_page_is_self_contained_with_all_parts_in_order() {
     }
     let heads = between(&page, "<h2>", "</h2>");
     let expected = [
-        "What to make of it",
-        "How sure projections are",
+        "Summary",
+        "Projection uncertainty",
         "Residuals and coverage",
         "In space",
         "Distortion",
-        "Without distortion",
+        "Undistorted image",
         "Models",
         "Parameters",
-        "Views, the worst first",
+        "Views, worst first",
     ];
     assert_eq!(heads, expected);
     // The verdict comes first, and every figure has a caption.

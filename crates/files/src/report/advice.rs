@@ -1,5 +1,5 @@
-//! Advice on what would improve a calibration. Every rule has its reason; none depends on the kind
-//! of camera. Every diagnosis is a warning, so that the page says no less than the program does.
+//! Advice on how to improve a calibration. Every rule states its reason, and none depends on the kind of camera. Every
+//! diagnosis is a warning, so the page contains all warnings of the program.
 
 use crate::report::content::Report;
 use crate::report::measures::survey::Survey;
@@ -17,7 +17,7 @@ pub enum Weight {
     Good,
     /// Better results are possible.
     Hint,
-    /// The figures are not reliable before this is corrected.
+    /// The figures are unreliable until this is corrected.
     Warning,
 }
 
@@ -27,50 +27,48 @@ pub enum Weight {
 pub struct Advice {
     /// Its importance.
     pub weight: Weight,
-    /// The observation, and what to do about it.
+    /// The observation and the remedy.
     pub text: String,
 }
 
-/// Least tilt that separates focal length from distance, rad: at usual distances the near side of
-/// the board is then seen larger than the far side by a tenth and more.
+/// Minimum tilt that separates focal length from distance, rad: at usual distances the near side of
+/// the board then appears at least 10 % larger than the far side.
 const TILTED_RAD: f64 = 0.35;
-/// Least number of tilted views: about two axes, both ways.
+/// Minimum number of tilted views: about two axes, in both directions.
 const TILTED_VIEWS: usize = 4;
 
-/// Least number of views: with fewer, a wrong one can hardly be identified.
+/// Minimum number of views: with fewer, an inconsistent view is hard to identify.
 const VIEWS: usize = 10;
 
-/// Fraction of the cells of the image that should hold corners: distortion between them is
-/// interpolated.
+/// Fraction of the cells of the image that should contain corners: distortion between them is interpolated.
 const COVERED: f64 = 0.75;
-/// Least distance of the outermost corner from the middle, as a fraction of the half diagonal:
-/// beyond it distortion is extrapolated, where polynomials diverge.
+/// Minimum distance of the outermost corner from the image centre, as a fraction of the half diagonal.
+/// Beyond it, distortion is extrapolated, and polynomials diverge.
 const REACH: f64 = 0.85;
 
-/// A distortion parameter smaller than this many standard deviations may be zero.
+/// Number of standard deviations below which a distortion parameter may be zero.
 const SIGNIFICANT: f64 = 2.0;
 
-/// Parameters with a greater correlation cannot be separated in practice.
+/// Correlation above which two parameters cannot be separated in practice.
 const CORRELATED: f64 = 0.99;
 
-/// A pattern of mean residuals this many times as large as by chance is lack of fit of the model.
+/// Ratio of mean residuals to their expected size from noise above which the model has lack of fit.
 const PATTERN: f64 = 3.0;
-/// Least size of such a pattern relative to the noise of a corner: a smaller one does not matter,
-/// however significant it is.
+/// Minimum size of a relevant pattern as a fraction of the corner noise: a smaller one does not matter, even if it is
+/// significant.
 const PATTERN_PART: f64 = 0.2;
 
-/// A view whose RMS residual is this many times the median should be inspected.
+/// Ratio to the median RMS residual above which a view should be inspected.
 const BAD_VIEW: f64 = 2.5;
 
-/// Held-out views whose RMS residual is this many times larger show overfitting, or views that
-/// differ.
+/// Ratio of held-out to training RMS residual above which the model overfits, or the views differ.
 const HOLDOUT: f64 = 1.25;
 
-/// Advice on a calibration, the most important first; `surveys` are those of its cameras, in order.
+/// Returns advice on a calibration, the most important first; `surveys` are those of its cameras, in order.
 pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     let mut found = Vec::new();
     let mut add = |weight, text: String| found.push(Advice { weight, text });
-    told(report, &mut add, Topic::Whole);
+    add_diagnoses(report, &mut add, Topic::Whole);
     let cameras = || report.estimate.cameras.iter().zip(surveys).enumerate();
     for (index, (camera, survey)) in cameras() {
         let mut add = |weight, text: String| {
@@ -78,15 +76,15 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
         };
         views(report, index, camera, survey, &mut add);
         coverage(report, camera, survey, &mut add);
-        told(report, &mut add, Topic::Lens(index));
+        add_diagnoses(report, &mut add, Topic::Lens(index));
         superfluous(camera, &mut add);
-        told(report, &mut add, Topic::Parameters(index));
+        add_diagnoses(report, &mut add, Topic::Parameters(index));
         correlated(camera, &mut add);
     }
     let mut add = |weight, text: String| found.push(Advice { weight, text });
     left_out(report, &mut add, |out| report.is_rig() && out.camera.is_none());
-    told(report, &mut add, Topic::Errors);
-    told(report, &mut add, Topic::Cause);
+    add_diagnoses(report, &mut add, Topic::Errors);
+    add_diagnoses(report, &mut add, Topic::Cause);
     for (index, (camera, survey)) in cameras() {
         let mut add = |weight, text: String| {
             found.push(Advice { weight, text: of_camera(report, camera, text) });
@@ -96,13 +94,13 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     let mut add = |weight, text: String| found.push(Advice { weight, text });
     if report.estimate.shape.is_some_and(|shape| !shape.is_significant()) {
         let text =
-            "The sheet's shape is no more than chance makes: take the calibration without it.";
+            "The estimated shape of the sheet is not significant: calibrate without it.";
         add(Weight::Hint, text.to_owned());
     }
     if let Some(shape) = report.estimate.shape.filter(|shape| shape.is_significant()) {
         let text = format!(
-            "The sheet is bent by {:.2} mm and its corners lie up to {:.2} mm beside their places; that \
-             is allowed for. Glue it on something flat.",
+            "The sheet is bent by {:.2} mm, and its corners are up to {:.2} mm from their nominal positions. The \
+             calibration corrects for this. Mount the sheet on a flat plate.",
             shape.bent_mm, shape.stretched_mm
         );
         add(Weight::Hint, text);
@@ -110,16 +108,16 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     let outliers = report.estimate.outlier_count();
     if outliers > 0 {
         let text = format!(
-            "{outliers} of {} corners lie farther off than chance allows; they are drawn in red.",
+            "{outliers} of {} corners are outliers; they are drawn in red.",
             report.estimate.corner_count()
         );
         add(Weight::Hint, text);
     }
     if let Some(held_out) = &report.estimate.held_out {
         let (test, own) = (held_out.rms_px, report.estimate.rms_px);
-        let figures = format!("{test:.4} px on views that took no part, {own:.4} px on its own");
+        let figures = format!("RMS {test:.4} px on held-out views, {own:.4} px on training views");
         if test > HOLDOUT * own {
-            let text = format!("{figures}: the model fits noise, or the views differ in kind.");
+            let text = format!("{figures}: the model overfits, or the held-out views differ in kind.");
             add(Weight::Warning, text);
         } else {
             add(Weight::Good, format!("{figures}."));
@@ -127,8 +125,8 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     }
     if report.print.scale.is_none() {
         let text = format!(
-            "Distances are as true as the print: measure both check bars of the sheet and give {PrintScale}. Focal \
-             lengths and distortion do not depend on it where both are off alike."
+            "The scale of all distances is that of the print: measure both check bars of the sheet and set {PrintScale}. Focal \
+             lengths and distortion do not change if both bars have the same scale error."
         );
         add(Weight::Hint, text);
     }
@@ -136,7 +134,7 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     found
 }
 
-/// A text about a camera, which is named where there are several.
+/// A text about a camera, prefixed with its name if there are several cameras.
 fn of_camera(report: &Report, camera: &CameraEstimate, text: String) -> String {
     // The text of a diagnosis names its camera.
     let named = format!("Camera {}", camera.name);
@@ -146,18 +144,18 @@ fn of_camera(report: &Report, camera: &CameraEstimate, text: String) -> String {
     }
 }
 
-/// What a diagnosis is about, which decides where among the advice it stands.
+/// The topic of a diagnosis, which determines its position in the advice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Topic {
-    /// The whole result, or anything without a topic of its own; it stands first.
+    /// The whole result, or anything without a more specific topic; comes first.
     Whole,
     /// The lens of a camera, by its index.
     Lens(usize),
     /// The parameters of a camera, by its index.
     Parameters(usize),
-    /// Corners that are wrong together.
+    /// Groups of corners that are outliers together.
     Errors,
-    /// Why residuals are not noise.
+    /// Causes of residuals that are not noise.
     Cause,
 }
 
@@ -179,7 +177,7 @@ impl Topic {
 }
 
 /// Adds the diagnoses of a topic.
-fn told(report: &Report, add: &mut impl FnMut(Weight, String), topic: Topic) {
+fn add_diagnoses(report: &Report, add: &mut impl FnMut(Weight, String), topic: Topic) {
     for diagnosis in report.diagnoses.iter().filter(|diagnosis| Topic::of(diagnosis) == topic) {
         add(Weight::Warning, sentence(&report.words().sentence(diagnosis)));
     }
@@ -196,7 +194,7 @@ fn views(
     if count < VIEWS {
         add(
             Weight::Warning,
-            format!("Only {}: take at least {VIEWS}, better 20 to 50.", counted(count, "view")),
+            format!("Only {}: take at least {VIEWS}, preferably 20 to 50.", counted(count, "view")),
         );
     }
     if survey.planar {
@@ -206,8 +204,8 @@ fn views(
             add(
                 Weight::Warning,
                 format!(
-                    "Only {tilted} of {count} views tilted by more than 20°: focal length and distance are \
-                     hardly told apart. Tilt the {} by 30° to 50°, to all four sides.",
+                    "Only {tilted} of {count} views are tilted by more than 20°, so focal length and distance are \
+                     hard to separate. Tilt the {} by 30° to 50° in all four directions.",
                     report.target_noun()
                 ),
             );
@@ -223,23 +221,23 @@ fn views(
     let median = median(rms.collect()).unwrap_or_default();
     let bad = camera.views.iter().filter(|view| view.rms_px > BAD_VIEW * median);
     let bad: Vec<&str> = bad.map(|view| view.name.as_str()).collect();
-    // Where the lens is not that of the model, or rows are displaced, photographs are not to blame.
+    // Photographs are not the cause if the lens model does not fit, or if the camera has a rolling shutter.
     let is_other = |said: &Diagnosis| match said {
         Diagnosis::RollingShutter { camera, .. } => *camera == index,
         _ => said.misfit_of() == Some(index),
     };
     if !bad.is_empty() && !report.diagnoses.iter().any(is_other) {
         let bent =
-            if report.has_panels() { "a panel that is bent or loose" } else { "a bent board" };
+            if report.has_panels() { "a bent or loose panel" } else { "a bent board" };
         let text = format!(
-            "Much worse than the others: {}. Look for motion blur, {bent}, or reflections.",
+            "Views with much larger residuals than the others: {}. Check for motion blur, {bent}, or reflections.",
             named(&bad)
         );
         add(Weight::Hint, text);
     }
 }
 
-/// Names the excluded views and panels.
+/// Adds a warning that lists the excluded views and panels.
 fn left_out(
     report: &Report,
     add: &mut impl FnMut(Weight, String),
@@ -249,12 +247,13 @@ fn left_out(
     let excluded: Vec<&str> = excluded.map(|out| out.view.as_str()).collect();
     if !excluded.is_empty() {
         let names = named(&excluded);
-        let text = format!("Left out, because they do not fit the others or the target: {names}.");
+        let text =
+            format!("Excluded, because they are inconsistent with the other views or the target: {names}.");
         add(Weight::Warning, text);
     }
 }
 
-/// Some names, the first of many.
+/// A list of names, shortened to the first three.
 fn named(names: &[&str]) -> String {
     match names {
         [a, b, c, rest @ ..] if !rest.is_empty() => {
@@ -274,8 +273,8 @@ fn coverage(
     let of_what = if survey.circle.is_some() { "image circle" } else { "image" };
     if covered < COVERED {
         let text = format!(
-            "Corners cover {:.0} % of the {of_what}: bring the {} to the empty cells of the map, \
-             parts of it may lie outside.",
+            "Corners cover {:.0} % of the {of_what}: move the {} to the empty cells of the coverage map. \
+             It may extend beyond the image.",
             100.0 * covered,
             report.target_noun()
         );
@@ -289,7 +288,7 @@ fn coverage(
             None => ("in the corners of the image", "half diagonal"),
         };
         let text = format!(
-            "No corner was seen {place}: beyond {:.0} % of its {length} the distortion is extrapolated.",
+            "No corner was seen {place}: distortion is extrapolated beyond {:.0} % of the {length}.",
             100.0 * reach
         );
         add(Weight::Hint, text);
@@ -303,12 +302,12 @@ fn sentence(text: &str) -> String {
     first.into_iter().chain(letters).chain(['.']).collect()
 }
 
-/// Parameters that a smaller model does without.
+/// Advises a smaller model if the additional parameters are not significant.
 fn superfluous(camera: &CameraEstimate, add: &mut impl FnMut(Weight, String)) {
     if let Some(model) = camera.model
         && let Some(smaller) = model.smaller()
     {
-        // What the smaller model does without.
+        // The parameters that the smaller model lacks.
         let there = smaller.free().into_iter().chain(std::iter::repeat(false));
         let more = model.free().into_iter().zip(there).zip(&camera.parameters);
         let more: Vec<_> =
@@ -317,8 +316,8 @@ fn superfluous(camera: &CameraEstimate, add: &mut impl FnMut(Weight, String)) {
         if more.iter().all(weak) {
             let names: Vec<&str> = more.iter().map(|p| p.name.as_str()).collect();
             let text = format!(
-                "Not told from zero: {}. The model {smaller} does without, and is safer where there \
-                 are no corners.",
+                "Not significantly different from zero: {}. The simpler model {smaller} extrapolates more \
+                 safely to regions without corners.",
                 names.join(", ")
             );
             add(Weight::Hint, text);
@@ -327,7 +326,7 @@ fn superfluous(camera: &CameraEstimate, add: &mut impl FnMut(Weight, String)) {
 }
 
 fn correlated(camera: &CameraEstimate, add: &mut impl FnMut(Weight, String)) {
-    // Correlations of neighbouring knots are of no interest.
+    // Neighbouring knots are always correlated.
     if matches!(camera.camera.lens, Lens::Spline(_)) {
         return;
     }
@@ -337,10 +336,10 @@ fn correlated(camera: &CameraEstimate, add: &mut impl FnMut(Weight, String)) {
     for i in 0..names.len() {
         for j in 0..i {
             let correlation = camera.correlation(i, j);
-            // Square pixels tie the two focal lengths to each other; that is no loss.
+            // Square pixels couple the two focal lengths, which is harmless.
             let focal = [names[j], names[i]] == ["fx", "fy"];
-            let told = is_loose(names[i]) && is_loose(names[j]);
-            if correlation.abs() > CORRELATED && !focal && !told {
+            let is_reported = is_loose(names[i]) && is_loose(names[j]);
+            if correlation.abs() > CORRELATED && !focal && !is_reported {
                 pairs.push(format!("{} with {}", names[j], names[i]));
             }
         }
@@ -350,8 +349,8 @@ fn correlated(camera: &CameraEstimate, add: &mut impl FnMut(Weight, String)) {
             if pairs.len() > 3 { format!(" and {} more", pairs.len() - 3) } else { String::new() };
         pairs.truncate(3);
         let text = format!(
-            "Correlated beyond ±{CORRELATED}: {}{more}. They are known together, neither of them \
-             alone.",
+            "Correlated beyond ±{CORRELATED}: {}{more}. Only their combination is determined, not the individual \
+             values.",
             pairs.join(", ")
         );
         add(Weight::Hint, text);
@@ -368,7 +367,7 @@ fn residuals(report: &Report, index: usize, survey: &Survey, add: &mut impl FnMu
         Some(pattern) if pattern > PATTERN && size > PATTERN_PART * camera.rms_px => {
             let (target, remedy) = match report.has_panels() {
                 true => (
-                    "panels are not flat or not where the target's file has them",
+                    "panels are bent or displaced from their poses in the target file",
                     CalibrationRefinePanels,
                 ),
                 false => ("the board is not flat", CalibrationBoardShape),
@@ -376,14 +375,14 @@ fn residuals(report: &Report, index: usize, survey: &Survey, add: &mut impl FnMu
             add(
                 Weight::Hint,
                 format!(
-                    "Residuals leave a pattern over the image, {pattern:.1} times what chance makes and \
-                     {size:.3} px strong: less than noise, but the model does not describe this lens \
-                     wholly, or {target}. Try a richer model, or {remedy}."
+                    "Residuals show a pattern over the image, {pattern:.1} times larger than expected from noise, with an rms of \
+                     {size:.3} px. It is smaller than the noise of a corner, but the model does not fully describe this lens, \
+                     or {target}. Try a model with more parameters, or {remedy}."
                 ),
             );
         }
         Some(_) => {
-            add(Weight::Good, "Residuals leave no strong pattern over the image.".to_owned())
+            add(Weight::Good, "Residuals show no strong pattern over the image.".to_owned())
         }
         None => {}
     }
@@ -397,7 +396,7 @@ mod tests {
     use deltille_calibrate::{Estimate, LackOfFit, Model, PanelPlace, ViewEstimate};
     use deltille_core::camera::{Camera, Pose};
 
-    /// What is advised where no parameter of the lens is told from zero.
+    /// The advice if no lens parameter differs significantly from zero.
     fn advised(model: Model) -> String {
         let camera = Camera::centred(640, 480, 500.0, model.lens());
         let values = camera.parameter_names().into_iter().zip(camera.parameters());
@@ -418,7 +417,7 @@ mod tests {
         advice.into_iter().map(|advice| advice.text + "\n").collect()
     }
 
-    /// An estimate of so many cameras and panels, without views.
+    /// An estimate with the given numbers of cameras and panels, without views.
     fn estimate(cameras: usize, panels: usize) -> Estimate {
         let camera = |index: usize| {
             let camera = Camera::centred(640, 480, 500.0, Model::Radtan.lens());
@@ -455,17 +454,17 @@ mod tests {
         let found = advice(&report, &surveys);
         for diagnosis in &diagnoses {
             let text = sentence(&report.words().sentence(diagnosis));
-            let told: Vec<&Advice> = found.iter().filter(|advice| advice.text == text).collect();
-            assert_eq!(told.len(), 1, "{text}");
-            assert_eq!(told[0].weight, Weight::Warning, "{text}");
+            let same: Vec<&Advice> = found.iter().filter(|advice| advice.text == text).collect();
+            assert_eq!(same.len(), 1, "{text}");
+            assert_eq!(same[0].weight, Weight::Warning, "{text}");
         }
-        // What is said of the whole result comes first.
-        assert!(found[3].text.starts_with("Camera c1 lags by 2 frames"), "{found:?}");
+        // Diagnoses of the whole result come first.
+        assert_eq!(found[3].text, sentence(&report.words().sentence(&diagnoses[3])), "{found:?}");
     }
 
-    /// Of a lens that is not that of the model some views are much worse than others.
+    /// With the wrong lens model, some views have much larger residuals than others.
     #[test]
-    fn photographs_are_not_blamed_for_a_model_that_does_not_fit() {
+    fn photographs_are_not_blamed_for_a_wrong_model() {
         let mut estimate = estimate(1, 1);
         let view = |index: usize| ViewEstimate {
             name: format!("{index}"),
@@ -491,29 +490,29 @@ mod tests {
     }
 
     #[test]
-    fn what_has_several_panels_is_no_board() {
+    fn only_targets_with_one_panel_are_called_boards() {
         for (panels, noun, other) in [(1, "board", "target"), (20, "target", "board")] {
             let estimate = estimate(1, panels);
             let report = Report::new("camera", &estimate);
             let surveys = [Survey::new(&estimate.cameras[0])];
             let found = advice(&report, &surveys);
             let texts: String = found.into_iter().map(|advice| advice.text + "\n").collect();
-            assert!(texts.contains(&format!("bring the {noun} to the empty cells")), "{texts}");
+            assert!(texts.contains(&format!("move the {noun} to the empty cells")), "{texts}");
             assert!(!texts.contains(other), "{texts}");
         }
     }
 
     #[test]
-    fn a_smaller_model_is_advised_where_there_is_one() {
+    fn a_smaller_model_is_advised_if_one_exists() {
         for (model, text) in [
-            (Model::Radtan5, "Not told from zero: k3. The model radtan does without"),
-            (Model::Rational, "Not told from zero: k4, k5, k6. The model radtan5 does without"),
-            (Model::KannalaBrandt(5), "Not told from zero: k5. The model kannala-brandt does"),
+            (Model::Radtan5, "from zero: k3. The simpler model radtan extrapolates"),
+            (Model::Rational, "from zero: k4, k5, k6. The simpler model radtan5 extrapolates"),
+            (Model::KannalaBrandt(5), "from zero: k5. The simpler model kannala-brandt extra"),
         ] {
             assert!(advised(model).contains(text), "{}", advised(model));
         }
         for model in [Model::Pupil, Model::Radtan, Model::KannalaBrandt(4)] {
-            assert!(!advised(model).contains("Not told from zero"), "{}", advised(model));
+            assert!(!advised(model).contains("from zero"), "{}", advised(model));
         }
     }
 }

@@ -1,19 +1,18 @@
 //! The report of a calibration: a self-contained HTML page with plots, tables and advice.
 //!
-//! Comes in: an estimate, its diagnoses, photographs and the models that were tried, as a [`Report`]. Goes out: one HTML file.
-//! Data meets the files and folders in this order:
+//! Input: an estimate, its diagnoses, photographs and compared models, as a [`Report`]. Output: one HTML file.
+//! Data passes through the files and folders in this order:
 //!
-//! 1. `measures` has what is shown beside the estimate itself: coverage, offsets of corners, distortion.
+//! 1. `measures` computes statistics that are not part of the estimate: coverage, offsets of corners, distortion.
 //! 2. `pictures` makes thumbnails and a sample of the photographs.
-//! 3. `content` is all that the page is made of.
-//! 4. `plots` draws SVG, `advice` says in words what would improve the calibration.
+//! 3. `content` defines the contents of the page.
+//! 4. `plots` draws SVG, and `advice` suggests how to improve the calibration.
 //! 5. `sections` puts tables and plots under headlines, with the elements of `html`.
-//! 6. `page` puts the verdict, the advice and all sections of each camera together.
+//! 6. `page` assembles the verdict, the advice and the sections of each camera.
 //!
 //! A module imports from those above it in this list, or from `html`, never in a circle.
 //!
-//! Limits: the tilt of a view is shown for planar targets only, as a solid shows faces at all
-//! tilts.
+//! Limits: the tilt of a view is shown for planar targets only, because the faces of a solid have different tilts.
 
 mod advice;
 mod content;

@@ -1,5 +1,4 @@
-//! Assembly of the HTML page: verdict, key figures and advice first, then the sections of each
-//! camera.
+//! Assembly of the HTML page: verdict, key figures and advice first, then the sections of each camera.
 
 use std::fmt::Write as _;
 
@@ -19,7 +18,7 @@ use deltille_core::words::counted;
 const STYLE: &str = include_str!("page.css");
 
 impl Report<'_> {
-    /// The page as one HTML file, with its pictures embedded.
+    /// Returns the page as one HTML file with embedded images.
     pub fn html(&self) -> String {
         html(self)
     }
@@ -43,9 +42,9 @@ fn html(report: &Report) -> String {
         [only] => cells(&of_camera(report, 0, only)),
         _ => cells(&of_rig(report)),
     };
-    page += "</header>\n<section><h2>What to make of it</h2><ul class=\"advice\">";
+    page += "</header>\n<section><h2>Summary</h2><ul class=\"advice\">";
     for piece in advice {
-        let (class, sign) = look(piece.weight);
+        let (class, sign) = class_and_sign(piece.weight);
         let _ = write!(
             page,
             "<li class=\"{class}\"><span class=\"sign\">{sign}</span><span>{}</span></li>",
@@ -79,7 +78,7 @@ fn html(report: &Report) -> String {
     }
     let _ = write!(
         page,
-        "<footer>deltille {}. Residuals are seen less predicted positions; rms is per coordinate, \
+        "<footer>deltille {}. Residuals are observed minus predicted positions; rms is per axis, \
          √(Σ(dx² + dy²) / 2N). Standard deviations are scaled by the residuals.</footer>\n</body>\n\
          </html>\n",
         env!("CARGO_PKG_VERSION")
@@ -101,20 +100,20 @@ fn distortion(camera: &CameraEstimate, survey: &Survey) -> String {
     section("Distortion", &figures(curve.into_iter().chain([grid])))
 }
 
-/// The section with the scene in space, once in the frame of the cameras and once in that of the
-/// target; empty where nothing was seen.
+/// The section with the scene in space, in the frame of the cameras and in that of the target; empty if the target was not
+/// seen.
 fn in_space(report: &Report) -> String {
     let image_px = report.estimate.cameras.first().map(|of| [of.camera.width, of.camera.height]);
     let image_px = DVec2::from(image_px.unwrap_or([4, 3]).map(f64::from));
     let drawn = [scene::Fixed::Rig, scene::Fixed::Target].map(|fixed| {
         let svg = scene::drawing(report.estimate, fixed, image_px);
         let what = match (fixed, report.is_rig()) {
-            (scene::Fixed::Rig, true) => "The cameras, and where they saw the target",
-            (scene::Fixed::Rig, false) => "The camera, and where it saw the target",
-            (scene::Fixed::Target, true) => "The target, and from where the cameras saw it",
-            (scene::Fixed::Target, false) => "The target, and from where the camera saw it",
+            (scene::Fixed::Rig, true) => "The cameras, and the poses of the target",
+            (scene::Fixed::Rig, false) => "The camera, and the poses of the target",
+            (scene::Fixed::Target, true) => "The target, and the poses of the cameras",
+            (scene::Fixed::Target, false) => "The target, and the poses of the camera",
         };
-        (svg, format!("{what}, in parallel projection; the view that fits worst is red."))
+        (svg, format!("{what}, in parallel projection. The view with the largest rms is red."))
     });
     if drawn.iter().all(|(svg, _)| svg.is_empty()) {
         return String::new();
@@ -122,37 +121,36 @@ fn in_space(report: &Report) -> String {
     section("In space", &figures(drawn))
 }
 
-/// The verdict before all else: that of the most serious piece of advice, in its colour and with its
-/// sign.
+/// The verdict at the top of the page. The most serious piece of advice determines its text, colour and sign.
 fn verdict(report: &Report, advice: &[Advice]) -> String {
     let is_failure = report.diagnoses.iter().any(Diagnosis::is_failure);
     let worst = advice.iter().map(|piece| piece.weight).max().unwrap_or(Weight::Good);
-    let (class, own_sign) = look(worst);
+    let (class, own_sign) = class_and_sign(worst);
     let of_worst = advice.iter().filter(|piece| piece.weight == worst).count();
     let below = |thing: &str| match of_worst {
         1 => format!("the {thing} below"),
         n => format!("the {} below", counted(n, thing)),
     };
     let (sign, head, why) = match worst {
-        _ if is_failure => ("✕", "Not to be used", "See why below.".to_owned()),
+        _ if is_failure => ("✕", "Do not use", "The reasons are below.".to_owned()),
         Weight::Warning => {
-            (own_sign, "Use with care", format!("Look at {} first.", below("warning")))
+            (own_sign, "Use with care", format!("See {} first.", below("warning")))
         }
         Weight::Hint => {
-            let verb = if of_worst == 1 { "says" } else { "say" };
-            let why = format!("No warnings; {} {verb} what would improve it.", below("hint"));
+            let verb = if of_worst == 1 { "shows" } else { "show" };
+            let why = format!("No warnings; {} {verb} how to improve it.", below("hint"));
             (own_sign, "Usable", why)
         }
-        Weight::Good => (own_sign, "Good", "Nothing speaks against it.".to_owned()),
+        Weight::Good => (own_sign, "Good", "No problems were found.".to_owned()),
     };
-    let sureness = if is_failure { String::new() } else { sureness(report) };
+    let uncertainty = if is_failure { String::new() } else { uncertainty(report) };
     format!(
-        "<p class=\"verdict {class}\"><span class=\"seal\">{sign}</span><span><b>{head}.</b> {why}{sureness}</span></p>\n"
+        "<p class=\"verdict {class}\"><span class=\"seal\">{sign}</span><span><b>{head}.</b> {why}{uncertainty}</span></p>\n"
     )
 }
 
 /// CSS class and sign of advice by its weight.
-fn look(weight: Weight) -> (&'static str, &'static str) {
+fn class_and_sign(weight: Weight) -> (&'static str, &'static str) {
     match weight {
         Weight::Good => ("good", "✓"),
         Weight::Hint => ("hint", "→"),
@@ -161,7 +159,7 @@ fn look(weight: Weight) -> (&'static str, &'static str) {
 }
 
 /// Summary of the uncertainty of projections of a single camera.
-fn sureness(report: &Report) -> String {
+fn uncertainty(report: &Report) -> String {
     let [camera] = report.estimate.cameras.as_slice() else { return String::new() };
     let distance = camera.projection.as_ref().and_then(|known| known.distances_mm.first().copied());
     let known = distance.and_then(|mm| {
@@ -169,27 +167,27 @@ fn sureness(report: &Report) -> String {
         Some((mm, sd(Source::Observed).or_else(|| sd(Source::Noise))?))
     });
     known.map_or(String::new(), |(mm, sd)| {
-        format!(" Where corners were, points {mm:.0} mm away are projected to ± {sd:.3} px.")
+        format!(" Projection uncertainty (1σ) at {mm:.0} mm, within the region with corners: {sd:.3} px.")
     })
 }
 
-/// The corners of the target that was measured.
+/// The section with the measured corners of the target.
 fn target(map: &TargetMap) -> String {
     let [plane, out] = map.rms_mm();
     let cells = cells(&[
-        (format!("{plane:.3} mm"), "in the plane, rms of a coordinate"),
+        (format!("{plane:.3} mm"), "in the plane, rms per axis"),
         (format!("{out:.3} mm"), "out of the plane, rms"),
-        (format!("{} of {}", map.significant().count(), map.corners().len()), "more than chance"),
+        (format!("{} of {}", map.significant().count(), map.corners().len()), "significant offsets"),
     ]);
     let svg = target_map::drawing(map, "");
     let body = format!(
-        "{cells}<figure class=\"wide\">{svg}<figcaption>Where the corners are, against the plan. Moves and turns of the target \
-         and its scale are not in it: poses and distances take them up.</figcaption></figure>"
+        "{cells}<figure class=\"wide\">{svg}<figcaption>Offsets of the corners from their nominal positions. Translation, \
+         rotation and scale of the target are removed: poses and distances absorb them.</figcaption></figure>"
     );
-    section("The target, measured", &body)
+    section("Measured target", &body)
 }
 
-/// Escaped text in which no line breaks within an option such as `--board-shape`.
+/// Escaped text that never breaks a line within an option such as `--board-shape`.
 fn with_whole_options(text: &str) -> String {
     let word = |word: &str| match word.starts_with("--") {
         true => format!("<span class=\"option\">{}</span>", escaped(word)),
@@ -205,7 +203,7 @@ mod tests {
     use deltille_core::camera::Camera;
 
     #[test]
-    fn the_verdict_is_that_of_the_most_serious_advice() {
+    fn the_most_serious_advice_determines_the_verdict() {
         let mut estimate = Estimate::default();
         let camera = Camera::centred(640, 480, 500.0, Model::Radtan.lens());
         estimate.cameras =
@@ -220,28 +218,28 @@ mod tests {
         let late = [Diagnosis::Late { camera: 1, frames: 2 }];
         let many_out = [Diagnosis::ManyLeftOut { left_out: 3, all: 9 }];
         for (weights, diagnoses, class, head, why) in [
-            (&[Good, Good][..], &[][..], "good", "Good", "Nothing speaks against it."),
-            (&[Hint, Good], &[], "hint", "Usable", "the hint below says"),
-            (&[Hint, Hint, Good], &[], "hint", "Usable", "the 2 hints below say"),
+            (&[Good, Good][..], &[][..], "good", "Good", "No problems were found."),
+            (&[Hint, Good], &[], "hint", "Usable", "the hint below shows"),
+            (&[Hint, Hint, Good], &[], "hint", "Usable", "the 2 hints below show"),
             (
                 &[Warning, Hint, Good],
                 &late,
                 "warning",
                 "Use with care",
-                "Look at the warning below first.",
+                "See the warning below first.",
             ),
             (
                 &[Warning, Warning, Good],
                 &late,
                 "warning",
                 "Use with care",
-                "Look at the 2 warnings below first.",
+                "See the 2 warnings below first.",
             ),
-            (&[Warning, Good], &many_out, "warning", "Not to be used", "See why below."),
+            (&[Warning, Good], &many_out, "warning", "Do not use", "The reasons are below."),
         ] {
-            let told = of(weights, diagnoses);
-            assert!(told.contains(&format!("class=\"verdict {class}\"")), "{told}");
-            assert!(told.contains(&format!("<b>{head}.</b>")) && told.contains(why), "{told}");
+            let html = of(weights, diagnoses);
+            assert!(html.contains(&format!("class=\"verdict {class}\"")), "{html}");
+            assert!(html.contains(&format!("<b>{head}.</b>")) && html.contains(why), "{html}");
         }
     }
 }

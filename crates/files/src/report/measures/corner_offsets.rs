@@ -1,4 +1,4 @@
-//! The offset of each corner on its panel that would explain its residuals, and their RMS.
+//! The offset of each corner on its panel that would explain its residuals, and the RMS of the residuals.
 //!
 //! An offset d of a corner in the plane of its panel causes the residual r = J d, with J the
 //! derivative of the pixel by the offset. The least-squares offset over all views of the corner is
@@ -7,9 +7,8 @@
 //!     d = (Σ JᵀJ)⁻¹ Σ Jᵀ r      covariance σ² (Σ JᵀJ)⁻¹
 //! ```
 //!
-//! Poses absorb what all corners of a panel have in common. `Calibration::measure_target` estimates
-//! heights and covariances of offsets as well; this is a quick approximation from the residuals
-//! that are left.
+//! Poses absorb common offsets of all corners of a panel. `Calibration::measure_target` also estimates heights and covariances;
+//! this is a quick approximation from the remaining residuals.
 
 use std::collections::BTreeMap;
 
@@ -18,14 +17,13 @@ use glam::{DMat2, DVec2};
 use deltille_calibrate::{CameraEstimate, Estimate, PanelRef, ViewEstimate};
 use deltille_core::camera::{Camera, Pose};
 
-/// Corners that are taken into account, of views evenly over all: more say no more.
+/// Maximum number of corners used, from evenly sampled views: more would not improve the result.
 const MOST_CORNERS: usize = 200_000;
 
-/// Threshold of a significant offset (χ² of two coordinates, exceeded by chance once in a thousand
-/// times).
+/// Threshold of a significant offset: χ² with two degrees of freedom at p = 0.001.
 pub(in crate::report) const SURE: f64 = 13.8;
 
-/// Fewest views of a corner.
+/// Minimum number of views of a corner.
 const LEAST_VIEWS: usize = 3;
 
 /// Statistics of a corner of the target.
@@ -40,7 +38,7 @@ pub(in crate::report) struct OfCorner {
     pub move_mm: DVec2,
     /// Whether the offset is significant.
     pub is_sure: bool,
-    /// Root mean square of its residuals, of a coordinate, px.
+    /// RMS of its residuals per axis, px.
     pub rms_px: f64,
     pub views: usize,
 }
@@ -55,11 +53,11 @@ struct Sums {
     views: usize,
 }
 
-/// The corners that a camera saw, by panel, row and column. Outliers are excluded; but where a
-/// corner is an outlier in most of its views, this is no accident, and all of them count.
+/// The corners that a camera saw, by panel, row and column. Outliers are excluded, unless a corner is an outlier in most of
+/// its views: then the error is systematic, and all views count.
 pub(in crate::report) fn of_corners(estimate: &Estimate, camera: &CameraEstimate) -> Vec<OfCorner> {
     let step = camera.corner_count().div_ceil(MOST_CORNERS).max(1);
-    // Of those that are no outliers, and of all.
+    // Sums of the inliers, and of all.
     let mut sums: BTreeMap<(PanelRef, i32, i32), [Sums; 2]> = BTreeMap::new();
     for view in camera.views.iter().step_by(step) {
         let mut places: BTreeMap<PanelRef, Option<Pose>> = BTreeMap::new();
@@ -113,8 +111,7 @@ pub(in crate::report) fn camera_from_panel(
     Some(view.pose.after(&scene_from_target).after(&place))
 }
 
-/// The point of a panel that a pixel sees, mm, and the derivative of the pixel by an offset in the
-/// plane, px/mm.
+/// The point of a panel that a pixel sees, mm, and the derivative of the pixel with respect to an offset in the plane, px/mm.
 fn at_corner(camera: &Camera, camera_from_panel: &Pose, pixel: DVec2) -> Option<(DVec2, DMat2)> {
     let at_mm = on_plane(camera, camera_from_panel, pixel)?;
     let point = camera_from_panel.apply(at_mm.extend(0.0));

@@ -1,13 +1,12 @@
-//! Radial displacement of a lens over the angle from its axis, compared with an ideal lens.
+//! Radial displacement of a lens relative to an ideal lens, against the angle from the axis.
 //!
 //! ```text
 //!     displacement(θ) = mean over φ of |p(θ, φ) − c| − |i(θ, φ) − c|       px
 //! ```
 //!
-//! p is the pixel of the camera for the direction at the angle θ from its axis and the azimuth φ, i
-//! that of an ideal lens with the same focal length near the axis: a pinhole, f tan θ, or for
-//! images that show more than a pinhole represents well, equidistant, f θ; c is the principal
-//! point.
+//! p is the pixel of the camera for the direction at the angle θ from its axis and the azimuth φ; i is that of an ideal lens with
+//! the same focal length near the axis; c is the principal point. The ideal lens is a pinhole, f tan θ, or equidistant, f θ, if
+//! the field of view is too wide for a pinhole.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -16,26 +15,25 @@ use glam::{DVec2, DVec3};
 use crate::report::measures::survey::Survey;
 use deltille_core::camera::Camera;
 
-/// Widest field for which a lens is compared with a pinhole, rad from the axis: there its radius is
-/// 2.7 times the focal length.
+/// Maximum angle from the axis at which a lens is compared with a pinhole, rad: there the radius is 2.7 times the focal length.
 const PINHOLE_RAD: f64 = 70.0 / 180.0 * PI;
 
-/// Widest field that is considered, rad from the axis: no lens sees more.
+/// Maximum angle from the axis, rad: no lens sees more.
 const MOST_RAD: f64 = 130.0 / 180.0 * PI;
 
-/// How far away what is seen at infinity is, mm; how near the axis the focal length is taken, rad.
+/// Distance that stands for infinity, mm, and angle from the axis at which the focal length is measured, rad.
 pub(in crate::report) const INFINITY_MM: f64 = 1e9;
 const NEAR_AXIS_RAD: f64 = 1e-4;
 
-/// Directions around the axis, and angles of the curve.
+/// Number of directions around the axis, and number of angles of the curve.
 const AROUND: usize = 32;
 const ANGLES: usize = 96;
 
-/// Least difference, px, between the projections of points at the distance of the corners and at
-/// infinity for which both have a curve.
+/// Minimum difference, px, between projections of points at the distance of the corners and at infinity at which both curves
+/// are drawn.
 pub(in crate::report) const APART_PX: f64 = 0.05;
 
-/// The ideal lens with which a lens is compared.
+/// The ideal lens that serves as reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::report) struct Ideal {
     focal_px: DVec2,
@@ -46,18 +44,18 @@ pub(in crate::report) struct Ideal {
 /// The displacement of a direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::report) struct Displacement {
-    /// From the axis, rad.
+    /// Angle from the axis, rad.
     pub angle_rad: f64,
-    /// Mean, least and most around the axis, px.
+    /// Mean, minimum and maximum around the axis, px.
     pub mean_px: f64,
     pub least_px: f64,
     pub most_px: f64,
 }
 
 impl Ideal {
-    /// Of a camera whose image shows so much, rad from the axis.
+    /// The ideal lens of a camera whose image reaches `widest_rad` from the axis.
     pub(crate) fn of(camera: &Camera, widest_rad: f64) -> Self {
-        // A spline has the axis where its knots say, not at cx and cy.
+        // The knots of a spline determine its axis, not cx and cy.
         let on_axis = camera.project(INFINITY_MM * DVec3::Z);
         let centre_px = on_axis.unwrap_or(camera.centre_px);
         let near = |axis: DVec3| {
@@ -82,7 +80,7 @@ impl Ideal {
         Some(self.centre_px + self.focal_px * radius * around)
     }
 
-    /// The direction of a pixel; `None` where there is none.
+    /// The direction of a pixel; `None` if the pixel has none.
     pub(crate) fn direction(&self, pixel: DVec2) -> Option<DVec3> {
         let flat = (pixel - self.centre_px) / self.focal_px;
         let angle = if self.is_pinhole { flat.length().atan() } else { flat.length() };
@@ -90,7 +88,7 @@ impl Ideal {
         (angle < MOST_RAD).then(|| (around * angle.sin()).extend(angle.cos()))
     }
 
-    /// Its law, as the axes name it.
+    /// The projection law, as the axis labels show it.
     pub(crate) fn law(&self) -> &'static str {
         if self.is_pinhole { "f · tan θ" } else { "f · θ" }
     }
@@ -100,8 +98,7 @@ impl Ideal {
     }
 }
 
-/// The angle from the axis that the image shows, rad: at its sides or its image circle, and in its
-/// corners.
+/// The angles from the axis at the limits of the image, rad: at its sides or its image circle, and in its corners.
 pub(in crate::report) fn shown_rad(camera: &Camera, survey: &Survey) -> [f64; 2] {
     let angle = |pixel: DVec2| {
         let ray = camera.unproject(pixel)?;
@@ -122,7 +119,7 @@ pub(in crate::report) fn shown_rad(camera: &Camera, survey: &Survey) -> [f64; 2]
     [side, corner.max(side)]
 }
 
-/// The displacements of points so far away, up to an angle.
+/// The displacements of points at a distance, up to an angle.
 pub(in crate::report) fn curve(
     camera: &Camera,
     ideal: &Ideal,
@@ -136,7 +133,7 @@ pub(in crate::report) fn curve(
             let around = DVec2::from_angle(TAU * i as f64 / AROUND as f64);
             let direction = (around * angle_rad.sin()).extend(angle_rad.cos());
             let pixel = camera.project(distance_mm * direction)?;
-            // Beyond the point where the radius decreases it is no lens.
+            // The model is not valid beyond the angle at which the radius decreases.
             let radius = ((pixel - camera.centre_px) / camera.focal_px).length();
             let centre_px = ideal.centre_px;
             let ideal = ideal.pixel(direction)?.distance(centre_px);
@@ -165,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn the_curve_has_the_formulas_of_the_lenses() {
+    fn the_curve_follows_the_lens_formulas() {
         let radial = [-0.2, 0.05, 0.01];
         let radtan = Lens::BrownConrady(BrownConrady { radial, ..BrownConrady::default() });
         let camera_of_it = camera(radtan, 900.0);
@@ -187,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pupil_that_moves_has_other_curves_near_and_far() {
+    fn near_and_far_curves_differ_for_a_moving_pupil() {
         let mut lens = Lens::Pupil(Pupil::default());
         let names = lens.names();
         let values = names.iter().map(|name| if name.starts_with('e') { 2.0 } else { 0.0 });
@@ -200,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn ideal_lenses_take_their_directions_back() {
+    fn ideal_lenses_unproject_their_projections() {
         for widest in [0.8, 1.8] {
             let ideal =
                 Ideal::of(&camera(Lens::BrownConrady(BrownConrady::default()), 500.0), widest);

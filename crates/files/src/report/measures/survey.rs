@@ -1,13 +1,13 @@
-//! What the views of a camera cover: corners and mean residuals by cell of the image, and the tilt
-//! and the distance of each view.
+//! Coverage of the views of a camera: corners and mean residuals by cell of the image, and the tilt and the distance of each
+//! view.
 //!
 //! ```text
-//!     mean of a cell  m = Σ r / n        r: residuals (seen less predicted) of its n inliers, px
-//!     its deviation   s = √( Σ |r − m|² / 2(n − 1) / n )              of each coordinate, px
+//!     mean of a cell  m = Σ r / n        r: residuals (observed minus predicted) of its n inliers, px
+//!     its std. dev.   s = √( Σ |r − m|² / 2(n − 1) / n )              of each coordinate, px
 //! ```
 //!
-//! Where residuals are noise, m / s is of the order of 1 in every cell; a model that does not
-//! describe the lens leaves neighbouring means that are larger and point alike.
+//! If residuals are noise, m / s is of the order of 1 in every cell. If the model does not describe the lens, means are larger
+//! and neighbouring means have similar directions.
 
 use glam::{DVec2, DVec3};
 
@@ -32,10 +32,9 @@ pub struct Survey {
     pub means_px: Vec<Option<CellMean>>,
     /// Tilt and distance of each view, in the order of the camera's views.
     pub views: Vec<SurveyedView>,
-    /// Whether only the first panel was seen, so that the target is a plane as far as this camera
-    /// can tell.
+    /// Whether this camera saw only the first panel, so the target is planar for it.
     pub planar: bool,
-    /// Image circle of the lens, where it does not fill the image.
+    /// Image circle of the lens; `None` if it fills the image.
     pub circle: Option<ImageCircle>,
 }
 
@@ -56,18 +55,17 @@ pub struct SurveyedView {
     /// Angle between the board's normal and the line of sight to the middle of its corners, rad;
     /// `None` for solids.
     pub tilt_rad: Option<f64>,
-    /// Direction in the image towards which the tilted board is farther away, rad from right towards below; `None` for
-    /// solids.
+    /// Direction in the image in which the tilted board is farther away, rad, from right towards down; `None` for solids.
     pub away_rad: Option<f64>,
     /// Distance of the origin of the target from the camera, mm.
     pub distance_mm: f64,
 }
 
-/// Least number of inliers for a mean: of fewer, the standard deviation says little.
+/// Minimum number of inliers for a mean: with fewer, the standard deviation is unreliable.
 const LEAST_IN_CELL: usize = 4;
 
 impl Survey {
-    /// Surveys the views of a camera, those that the calibration used.
+    /// Computes the statistics of the views of a camera that the calibration used.
     pub fn new(camera: &CameraEstimate) -> Self {
         let size_px = DVec2::new(camera.camera.width.into(), camera.camera.height.into());
         let cells = (size_px / (size_px.max_element() / CELLS as f64)).round().to_array();
@@ -94,7 +92,7 @@ impl Survey {
         Self { size_px, cells, counts, means_px, views, planar, circle }
     }
 
-    /// Fraction of the cells of the image, or of its image circle, that hold corners.
+    /// Fraction of the cells of the image, or of its image circle, that contain corners.
     pub fn covered(&self) -> f64 {
         let [columns, rows] = self.cells;
         let is_shown = |index: usize| {
@@ -108,8 +106,8 @@ impl Survey {
         covered as f64 / shown.len().max(1) as f64
     }
 
-    /// Distance of the outermost corner from the middle of the image, as a fraction of half its
-    /// diagonal; or from the middle of the image circle, as a fraction of its radius.
+    /// Distance of the outermost corner from the image centre, as a fraction of half the diagonal; or
+    /// from the centre of the image circle, as a fraction of its radius.
     pub fn reach(&self, camera: &CameraEstimate) -> f64 {
         let size = self.size_px;
         let whole =
@@ -119,8 +117,8 @@ impl Survey {
         radii.fold(0.0, f64::max) / circle.radius_px
     }
 
-    /// RMS of the mean residuals of cells in units of their standard deviations: 1 where residuals
-    /// are random, more where the model has lack of fit. `None` without cells that have a mean.
+    /// RMS of the mean residuals of cells in units of their standard deviations: 1 if residuals are
+    /// random, more if the model has lack of fit. `None` if no cell has a mean.
     pub fn pattern(&self) -> Option<f64> {
         let seen: Vec<f64> = self
             .means_px
@@ -133,8 +131,7 @@ impl Survey {
     }
 }
 
-/// Mean of the residuals of a cell, px, with its standard deviation; `None` where they are too few,
-/// or all the same.
+/// Mean of the residuals of a cell, px, with its standard deviation; `None` if there are too few, or if all are equal.
 fn cell_mean(residuals: &[DVec2]) -> Option<CellMean> {
     if residuals.len() < LEAST_IN_CELL {
         return None;
@@ -147,8 +144,8 @@ fn cell_mean(residuals: &[DVec2]) -> Option<CellMean> {
     (sd_px > 0.0).then_some(CellMean { mean_px, sd_px })
 }
 
-/// Tilt and distance of a view; without a tilt where the target is no plane, or where the lens has
-/// no ray for the mean position of the corners.
+/// Tilt and distance of a view. The tilt is `None` if the target is not planar, or if the lens has no ray for the mean
+/// position of the corners.
 fn surveyed(camera: &Camera, view: &ViewEstimate, planar: bool) -> SurveyedView {
     let count = view.corners.len().max(1) as f64;
     let middle = view.corners.iter().map(|corner| corner.pixel).sum::<DVec2>() / count;
@@ -160,18 +157,18 @@ fn surveyed(camera: &Camera, view: &ViewEstimate, planar: bool) -> SurveyedView 
     }
 }
 
-/// The angle between the normal of a board and the line of sight to a place of the image, and the direction in the image in
-/// which the board is farther away, rad; `None` where the lens has no ray there.
+/// The angle between the normal of a board and the line of sight to an image position, and the direction in the image in
+/// which the board is farther away, rad; `None` if the lens has no ray there.
 fn lean(camera: &Camera, pose: &Pose, place: DVec2) -> Option<[f64; 2]> {
     let normal = pose.rotation * DVec3::Z;
     let sight = camera.unproject(place)?.direction.normalize();
-    // A board that faces the camera has its normal against the line of sight; it leans to where it is farther away.
+    // The normal of a board that faces the camera is opposite to the line of sight. The board leans to its far side.
     let leant = normal.reject_from_normalized(sight);
     let step = camera.project(sight + STEP * leant)? - camera.project(sight)?;
     Some([normal.angle_between(-sight), step.to_angle()])
 }
 
-/// A step across the line of sight that is short against the curvature of any lens, in distances.
+/// Step across the line of sight, as a fraction of the distance; short relative to the curvature of any lens.
 const STEP: f64 = 1e-3;
 
 #[cfg(test)]
@@ -182,7 +179,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn boards_lean_as_they_were_asked_to_be_held() {
+    fn boards_lean_as_the_guide_requested() {
         let board = Target::new("desk", BoardSpec::deltille(9, 12, 20.0)).unwrap();
         for model in [Model::Radtan5, Model::KannalaBrandt(4)] {
             let guide = Guide::new(&board, [1280, 720], model).unwrap();

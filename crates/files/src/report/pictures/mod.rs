@@ -1,9 +1,9 @@
 //! Photographs on the page.
 //!
-//! Comes in: a photograph. Goes out: a small PNG of it.
+//! Input: a photograph. Output: a small PNG.
 //!
 //! 1. `thumbnail` reduces it.
-//! 2. `sample` sets it beside its undistorted version.
+//! 2. `sample` shows it beside its undistorted version.
 
 pub(super) mod sample;
 pub(super) mod thumbnail;

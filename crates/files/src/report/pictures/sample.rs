@@ -1,5 +1,4 @@
-//! A photograph beside its undistorted version, in which lines through the corners of a row are
-//! straight.
+//! A photograph beside its undistorted version, in which lines through the corners of a row are straight.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -14,16 +13,16 @@ use deltille_calibrate::{CameraEstimate, Corner, ViewEstimate};
 use deltille_core::camera::{Field, Undistortion};
 use deltille_core::raster::Gray;
 
-/// Longest side of the pictures, px.
+/// Longest side of the images, px.
 const SIDE: usize = 520;
 
-/// Widest field of view that is shown, rad: beyond it the border takes up all of the picture.
+/// Maximum field of view, rad: a wider one would leave most of the image to its border.
 const WIDEST_RAD: f64 = 110.0 / 180.0 * std::f64::consts::PI;
 
-/// Angle from the axis within which corners are inside that field, rad.
+/// Angle from the axis within which corners lie inside that field of view, rad.
 const AHEAD_RAD: f64 = 45.0 / 180.0 * std::f64::consts::PI;
 
-/// Least number of corners of a line.
+/// Minimum number of corners of a line.
 const LEAST_IN_LINE: usize = 3;
 
 /// A photograph of a camera and its undistorted version.
@@ -33,17 +32,17 @@ pub struct Sample {
     size_px: DVec2,
     photograph: Vec<u8>,
     undistorted: Vec<u8>,
-    /// Size of the undistorted picture, px.
+    /// Size of the undistorted image, px.
     undistorted_px: DVec2,
     field_rad: f64,
-    /// Chords from the first to the last corner of rows and columns, and the corners, in both pictures.
+    /// Chords from the first to the last corner of rows and columns, and the corners, in both images.
     lines: [Vec<[DVec2; 2]>; 2],
     corners: [Vec<DVec2>; 2],
 }
 
 impl Sample {
-    /// The view of a camera, among those that satisfy `is_meant`, whose corners fill most of the
-    /// picture within the field of a pinhole.
+    /// Returns the view, among those that satisfy `is_meant`, whose corners cover most of the image
+    /// within the field of view of a pinhole.
     pub fn best(
         camera: &CameraEstimate,
         is_meant: impl Fn(&&ViewEstimate) -> bool,
@@ -64,8 +63,8 @@ impl Sample {
         views.into_iter().find(is_meant)
     }
 
-    /// Undistorts the photograph of a view; `None` where the camera has no ray along its axis, or
-    /// the picture cannot be made.
+    /// Undistorts the photograph of a view. `None` if the camera has no ray along its axis, or the
+    /// undistorted image cannot be made.
     pub fn of(camera: &CameraEstimate, view: &ViewEstimate, photograph: Gray<u8>) -> Option<Self> {
         let lens = &camera.camera;
         let distance_mm = view.pose.translation.length();
@@ -81,7 +80,7 @@ impl Sample {
         let whole = GrayImage::from_raw(w as u32, h as u32, photograph.pixels().to_vec())?;
         let straight = remapped(&DynamicImage::ImageLuma8(whole), &undistortion.map());
         let straight = png(&straight.into_luma8())?;
-        // A corner in the new picture.
+        // A corner in the undistorted image.
         let place = |pixel: DVec2| {
             let ray = lens.unproject(pixel)?;
             let point: DVec3 = ray.origin + ray.direction * distance_mm;
@@ -112,11 +111,11 @@ impl Sample {
         })
     }
 
-    /// Both pictures beside each other.
+    /// The section with both images side by side.
     pub(crate) fn section(&self) -> String {
         let drawn = |index: usize, png: &[u8], size: DVec2, shows: &str| {
             let DVec2 { x: w, y: h } = size;
-            // Lines as wide in both.
+            // Lines have the same width in both images.
             let unit = w / SIDE as f64;
             let mut svg = format!(
                 "<svg class=\"sample\" viewBox=\"-0.5 -0.5 {w} {h}\" width=\"{SIDE}\" role=\"img\" aria-label=\"{shows}\">\
@@ -146,21 +145,21 @@ impl Sample {
             svg + "</svg>"
         };
         let [photograph, straight] = [
-            drawn(0, &self.photograph, self.size_px, "A photograph"),
-            drawn(1, &self.undistorted, self.undistorted_px, "The same without distortion"),
+            drawn(0, &self.photograph, self.size_px, "Original image"),
+            drawn(1, &self.undistorted, self.undistorted_px, "Undistorted image"),
         ];
         format!(
-            "<section><h2>Without distortion</h2><div class=\"plots\"><figure>{photograph}<figcaption>View {}, as it was \
-             taken: straight lines between the first and the last corner of rows and columns miss those \
-             between.</figcaption></figure><figure>{straight}<figcaption>The same without distortion, {:.0}° wide: corners \
-             lie on the lines if the camera is right.</figcaption></figure></div></section>\n",
+            "<section><h2>Undistorted image</h2><div class=\"plots\"><figure>{photograph}<figcaption>View {}, original: \
+             straight lines between the first and the last corner of rows and columns miss the corners \
+             in between.</figcaption></figure><figure>{straight}<figcaption>The same view undistorted, {:.0}° wide: corners \
+             lie on the lines if the calibration is correct.</figcaption></figure></div></section>\n",
             escaped(&self.view),
             self.field_rad.to_degrees()
         )
     }
 }
 
-/// The corners of each row, or of each column, in their order.
+/// The corners of each row, or of each column, in order.
 fn lines_of(view: &ViewEstimate, along_rows: bool) -> BTreeMap<(usize, i32), Vec<&Corner>> {
     let mut lines: BTreeMap<(usize, i32), Vec<&Corner>> = BTreeMap::new();
     let of_line = |corner: &Corner| if along_rows { corner.row } else { corner.col };

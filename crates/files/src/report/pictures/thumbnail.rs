@@ -7,8 +7,8 @@ use deltille_core::raster::Gray;
 /// Longest side of a thumbnail, px.
 const SIDE: usize = 240;
 
-/// The thumbnail of an image as PNG, at most 240 px on its longer side, each pixel the mean of
-/// those that it covers; `None` where it cannot be encoded.
+/// Returns the thumbnail of an image as PNG, at most 240 px on its longer side. Each pixel is the mean of the pixels that it
+/// covers. `None` if the PNG cannot be encoded.
 pub fn thumbnail(image: &Gray<u8>) -> Option<Vec<u8>> {
     png(&reduced(image, SIDE))
 }

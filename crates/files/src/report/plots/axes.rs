@@ -1,5 +1,5 @@
-//! Axes of a plot as SVG, in user units. All plots of a page have equally wide frames, and equally
-//! large ones beside a picture of the same camera.
+//! Axes of a plot as SVG, in user units. All plots of a page have frames of equal width; plots of the same camera also have
+//! equal height.
 //!
 //! ```text
 //!     ┌──────────────────┐  ABOVE
@@ -7,57 +7,57 @@
 //!     │ within the room  │
 //!     └──────────────────┘
 //!             x             BELOW
-//!     what colours and arrows mean: foot
+//!     legend of colours and arrows: foot
 //! ```
 
 use std::fmt::Write as _;
 
 use glam::DVec2;
 
-/// Room around the frame for the numbers and names of its axes, user units.
+/// Margins around the frame for the numbers and names of its axes, user units.
 const LEFT: f64 = 64.0;
 const BELOW: f64 = 40.0;
 const ABOVE: f64 = 10.0;
 const RIGHT: f64 = 12.0;
 
-/// Width of the frames of all plots, and their least and greatest height, user units.
+/// Width of the frames of all plots, and their minimum and maximum height, user units.
 const FRAME: f64 = 444.0;
 const FRAME_HEIGHTS: [f64; 2] = [240.0, 444.0];
 
-/// Width of a digit, least gap between numbers side by side, and height of a line, user units.
+/// Width of a digit, minimum gap between adjacent numbers, and height of a line, user units.
 const DIGIT: f64 = 7.0;
 const APART: f64 = 8.0;
 const LINE: f64 = 16.0;
 
-/// Greatest number of intervals between the ticks of an axis.
+/// Maximum number of intervals between the ticks of an axis.
 const STEPS: f64 = 7.0;
 
-/// Number of powers of ten over which intervals between ticks are tried, from the finest on.
+/// Number of powers of ten over which tick intervals are tried, in ascending order.
 const DECADES: i32 = 4;
 
-/// Width and height, user units, of the frame of every plot about a camera with an image of this
-/// size, px. It has the proportions of the image unless that is very wide or very high.
+/// Width and height, user units, of the frame of every plot of a camera with this image size, px. The
+/// frame has the aspect ratio of the image unless that is extreme.
 pub(super) fn frame(image_px: DVec2) -> DVec2 {
     let [low, high] = FRAME_HEIGHTS;
     DVec2::new(FRAME, (FRAME * image_px.y / image_px.x).clamp(low, high).round())
 }
 
-/// A frame with axes, into which data are drawn. Points are given in the units of the axes; all
+/// A frame with axes for data. Points are given in the units of the axes; all
 /// other lengths are user units of the SVG.
 pub(super) struct Axes {
     /// Values of the axes at the left and at the right end of the frame.
     x: [f64; 2],
-    /// Values at the lower and at the upper end; the first is the larger one where y runs downwards.
+    /// Values at the lower and at the upper end; the first is larger if y runs downwards.
     y: [f64; 2],
     /// Size of the frame.
     size: DVec2,
-    /// Size of the area in whose middle the frame stands, equal for all plots of a camera.
+    /// Size of the area around the centred frame, equal for all plots of a camera.
     room: DVec2,
     /// SVG elements drawn so far.
     body: String,
-    /// Height of what stands below the axes, and its SVG elements.
+    /// Height of the legend below the axes, and its SVG elements.
     foot: (f64, String),
-    /// Whether there is a frame, with ticks and names.
+    /// Whether the frame, ticks and names are drawn.
     is_framed: bool,
 }
 
@@ -69,7 +69,7 @@ impl Axes {
     }
 
     /// A frame with the proportions of an image whose size is given in px. Its axes are pixel
-    /// coordinates, which are integers in the middles of pixels; y runs downwards.
+    /// coordinates, which are integers at pixel centres; y runs downwards.
     pub(super) fn of_image(image_px: DVec2) -> Self {
         let room = frame(image_px);
         let size = image_px * (room / image_px).min_element();
@@ -82,8 +82,8 @@ impl Axes {
         Self { is_framed: false, ..Self::new(frame(image_px), [0.0, 1.0], [0.0, 1.0]) }
     }
 
-    /// Upper left corner and size, user units, of the area that may be drawn into; without a frame
-    /// it includes the margins that other plots use for numbers.
+    /// Upper left corner and size, user units, of the drawing area; without a frame it includes the
+    /// margins that other plots use for numbers.
     pub(super) fn bounds(&self) -> [DVec2; 2] {
         match self.is_framed {
             true => [self.corner(), self.size],
@@ -91,7 +91,7 @@ impl Axes {
         }
     }
 
-    /// The position in the picture, user units, of a point given in the units of the axes.
+    /// The position in the SVG, user units, of a point given in the units of the axes.
     pub(super) fn at(&self, DVec2 { x, y }: DVec2) -> DVec2 {
         let part = |v: f64, [low, high]: [f64; 2]| (v - low) / (high - low);
         let parts = DVec2::new(part(x, self.x), 1.0 - part(y, self.y));
@@ -126,7 +126,7 @@ impl Axes {
         self.foot = (height, elements);
     }
 
-    /// Greatest width of the legend set by [`Self::foot`], user units.
+    /// Maximum width of the legend set by [`Self::foot`], user units.
     pub(super) fn foot_width(&self) -> f64 {
         self.room.x
     }
@@ -145,7 +145,7 @@ impl Axes {
         );
     }
 
-    /// Adds a text at a point, moved by `by`, user units; `anchor` is a value of `text-anchor`.
+    /// Adds text at a point, shifted by `by`, user units; `anchor` is a value of `text-anchor`.
     pub(super) fn text(&mut self, point: DVec2, by: DVec2, anchor: &str, text: &str) {
         let DVec2 { x, y } = self.at(point) + by;
         let _ = write!(
@@ -164,7 +164,7 @@ impl Axes {
         let _ = write!(self.body, "<polyline class=\"{class}\" points=\"{}\"/>", places.join(" "));
     }
 
-    /// Adds a rectangle of a CSS class between two opposite corners; `style` are further attributes.
+    /// Adds a rectangle of a CSS class between two opposite corners; `style` contains further attributes.
     pub(super) fn bar(&mut self, low: DVec2, high: DVec2, class: &str, style: &str) {
         let (low, high) = (self.at(low), self.at(high));
         let (DVec2 { x, y }, size) = (low.min(high), (high - low).abs());
@@ -176,13 +176,13 @@ impl Axes {
         );
     }
 
-    /// The finished picture with the names of the x and y axes; `shows` is what screen readers say.
+    /// Returns the finished SVG with the names of the x and y axes; `shows` is the text for screen readers.
     pub(super) fn svg(self, names: [&str; 2], shows: &str) -> String {
         self.svg_with(names, shows, "", "")
     }
 
-    /// The same with further attributes of the `svg` element and with a `style` element, for a file
-    /// of its own, which has no page's style sheet.
+    /// Like [`Self::svg`], with further attributes of the `svg` element and a `style` element for a
+    /// standalone file, which has no style sheet.
     pub(super) fn svg_with(
         self,
         names: [&str; 2],
@@ -245,9 +245,9 @@ impl Axes {
     }
 }
 
-/// Values and texts of the ticks in a range, at the smallest round interval at which the texts do
-/// not touch. `length` is the length of the axis and `room` the length that a text takes up along
-/// it, both in user units.
+/// Values and labels of the ticks in a range, at the smallest round interval at which the labels do
+/// not touch. `length` is the length of the axis and `room` the length of a label along it, both in
+/// user units.
 fn ticks([low, high]: [f64; 2], length: f64, room: impl Fn(&str) -> f64) -> Vec<(f64, String)> {
     let (low, high) = (low.min(high), low.max(high));
     let rough = (high - low) / STEPS;
@@ -268,8 +268,7 @@ fn ticks([low, high]: [f64; 2], length: f64, room: impl Fn(&str) -> f64) -> Vec<
     fitting.map_or_else(Vec::new, |(_, ticks)| ticks)
 }
 
-/// Text of the number at a tick, with the decimal places that an interval of this power of ten
-/// needs.
+/// Label of a tick, with the decimal places that an interval of this power of ten needs.
 fn number(value: f64, decade: i32) -> String {
     let places = (-decade).max(0) as usize;
     let text = format!("{value:.places$}");
@@ -294,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_beside_each_other_do_not_touch() {
+    fn adjacent_numbers_do_not_touch() {
         assert_eq!(texts([-0.07, 0.07], 250.0), ["−0.05", "0", "0.05"]);
         assert_eq!(texts([-0.0035, 0.0035], 250.0), ["−0.002", "0", "0.002"]);
     }

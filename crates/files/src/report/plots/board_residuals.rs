@@ -1,4 +1,4 @@
-//! Residuals by corner of the target, drawn on its panels.
+//! Residuals of each target corner, drawn on the panels.
 
 use std::fmt::Write as _;
 
@@ -11,15 +11,15 @@ use crate::report::plots::round_down::round_down;
 use deltille_calibrate::{CameraEstimate, Estimate};
 use deltille_core::statistics::quantile;
 
-/// Nearly all arrows are at most as long as this part of the distance between corners.
+/// Length that nearly all arrows stay below, as a fraction of the corner spacing.
 const ARROW_PART: f64 = 0.8;
 const NEARLY_ALL: f64 = 0.95;
 
-/// Room for scales below, user units, and parts of the scale of colours.
+/// Height reserved for the scales below the plot, user units, and number of steps of the colour scale.
 const FOOT: f64 = 58.0;
 const STEPS: usize = 22;
 
-/// The corners as a picture, and in words what it is; `None` where no corner was seen often enough.
+/// Returns the plot and its caption; `None` if no corner was seen in enough views.
 pub(in crate::report) fn plot(
     estimate: &Estimate,
     camera: &CameraEstimate,
@@ -29,7 +29,7 @@ pub(in crate::report) fn plot(
     let mut errors: Vec<f64> = corners.iter().map(|corner| corner.rms_px).collect();
     let most_px = quantile(&mut errors, 1.0)?.max(1e-9);
     let colour = |px: f64| {
-        // The darkest would hide the arrows' feet.
+        // The darkest colour would hide the start of the arrows.
         let place = (px / most_px * (COLOURS.len() - 2) as f64) as usize;
         COLOURS[place.min(COLOURS.len() - 2)]
     };
@@ -47,7 +47,7 @@ pub(in crate::report) fn plot(
         ),
     });
     let marks: Vec<Mark> = marks.collect();
-    // Within a frame as large as that of the other plots.
+    // The frame has the size of the other plots.
     let mut axes = Axes::bare(survey.size_px);
     let [origin, room] = axes.bounds();
     let panels = Panels::new(&marks, room.x, room.y);
@@ -64,14 +64,14 @@ pub(in crate::report) fn plot(
     let svg = axes.svg(["", ""], "Residuals of each corner of the target");
     let sure = corners.iter().filter(|corner| corner.is_sure).count();
     let caption = format!(
-        "Residuals of each corner of the target over all views: colour is their rms, arrows show where on its panel they \
-         would have the corner, {enlarged} times enlarged; {sure} of {} by more than chance makes (the others are grey).",
+        "Residuals of each target corner over all views. The colour is their rms. Arrows show the offset on the panel that \
+         would explain them, enlarged {enlarged} times; {sure} of {} offsets are significant (the others are grey).",
         corners.len()
     );
     Some((svg, caption))
 }
 
-/// What colours and arrows mean.
+/// The legend of colours and arrows.
 fn scales(
     most_px: f64,
     colour: &impl Fn(f64) -> &'static str,

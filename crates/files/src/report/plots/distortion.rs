@@ -1,5 +1,5 @@
-//! Distortion of a lens: its radial displacement over the angle from the axis, and a grid over the
-//! image, both compared with an ideal lens.
+//! Distortion of a lens relative to an ideal lens: radial displacement against the angle from the axis, and a grid over the
+//! image.
 
 use glam::{DVec2, DVec3};
 
@@ -14,17 +14,17 @@ use deltille_calibrate::CameraEstimate;
 /// Bins in which corners are counted by their angle.
 const BINS: usize = 40;
 
-/// Lines of the grid over the longer side, and points of each.
+/// Number of grid lines over the longer side, and number of points per line.
 const LINES: f64 = 14.0;
 const POINTS: usize = 80;
 
-/// A grid that is displaced by less than this part of the image's width is drawn with its displacements enlarged to it.
+/// Displacement, as a fraction of the image width, to which smaller displacements of the grid are enlarged.
 const SEEN_PART: f64 = 0.03;
 
-/// Room for what lines mean, user units.
+/// Height of the legend, user units.
 const FOOT: f64 = 24.0;
 
-/// The curve as a picture, and in words what it is.
+/// The plot of the distortion curve and its caption.
 pub(in crate::report) fn curve_plot(
     found: &CameraEstimate,
     survey: &Survey,
@@ -37,7 +37,7 @@ pub(in crate::report) fn curve_plot(
         .filter_map(|at| Some(camera.unproject(at.pixel)?.direction.angle_between(DVec3::Z)))
         .collect();
     let farthest = of_corners.iter().copied().fold(0.0, f64::max);
-    // At the same angles at every distance.
+    // The angles are the same at every distance.
     let most = corner.max(farthest);
     let far = curve(camera, &ideal, INFINITY_MM, most);
     let widest = far.last().filter(|last| last.angle_rad > 0.0)?.angle_rad;
@@ -53,7 +53,7 @@ pub(in crate::report) fn curve_plot(
     let margin = 0.08 * (high - low).max(0.1);
     let y = [low - margin, high + margin];
     let mut axes = Axes::new(frame(survey.size_px), [0.0, widest.to_degrees()], y);
-    // Where no corner was the curve is extrapolated.
+    // Outside the corners, the curve is extrapolated.
     if farthest < widest {
         let low = DVec2::new(farthest.to_degrees(), y[0]);
         axes.bar(low, DVec2::new(widest.to_degrees(), y[1]), "beyond-corners", "");
@@ -103,18 +103,18 @@ pub(in crate::report) fn curve_plot(
              <text x=\"300\" y=\"14\">beyond the corners</text>";
     axes.foot(FOOT, foot);
     let shown = axes.svg(
-        ["angle from the axis, °", &format!("radius less {}, px", ideal.law())],
+        ["angle from the axis, °", &format!("radius minus {}, px", ideal.law())],
         "Distortion curve",
     );
     let caption = format!(
-        "How much farther from the middle than {} the lens has a point at an angle from its axis (below 0: nearer); bars \
-         below count corners.",
+        "Radial distance of a point in the image, minus that of {}, against its angle from the axis (below 0: closer to the \
+         centre). Bars at the bottom count corners.",
         ideal.name()
     );
     Some((shown, caption))
 }
 
-/// The grid of an ideal lens, as this one has it, and in words what it is.
+/// The straight grid of an ideal lens as distorted by this lens, and the caption.
 pub(in crate::report) fn grid_plot(found: &CameraEstimate, survey: &Survey) -> (String, String) {
     let camera = &found.camera;
     let ideal = Ideal::of(camera, shown_rad(camera, survey)[1]);
@@ -126,7 +126,7 @@ pub(in crate::report) fn grid_plot(found: &CameraEstimate, survey: &Survey) -> (
     };
     let size = survey.size_px;
     let step = size.max_element() / LINES;
-    // As much beyond the image as may be bent into it.
+    // Lines beyond the image may be bent into it.
     let beyond = LINES.ceil() as i64;
     let lines = |along: DVec2, across: DVec2| {
         (-beyond..=beyond).map(move |line| {
@@ -171,11 +171,11 @@ pub(in crate::report) fn grid_plot(found: &CameraEstimate, survey: &Survey) -> (
     );
     let shown = axes.svg(["x, px", "y, px"], "Distortion over the image");
     let times = match enlarged > 1.0 {
-        true => format!(", with its displacements {enlarged} times enlarged"),
+        true => format!(", with displacements enlarged {enlarged} times"),
         false => String::new(),
     };
     let caption = format!(
-        "The straight grid that {} would show, and what this lens makes of it{times}; at most {} within the image.",
+        "The straight grid as seen by {}, and the same grid as seen by this lens{times}. The largest displacement within the image is {}.",
         ideal.name(),
         match most < 0.1 {
             true => format!("{most:.3} px"),

@@ -1,5 +1,4 @@
-//! Maps over an image as SVG: colours for the size of a value, an outline around the region with
-//! corners, and arrows.
+//! Maps over an image as SVG: colours for magnitudes, an outline around the region with corners, and arrows.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -11,29 +10,29 @@ use crate::report::plots::round_down::round_down;
 use deltille_calibrate::{CameraEstimate, Comparison, Source, UncertaintyMap};
 use deltille_core::statistics::quantile;
 
-/// Room for the scales below the picture, user units.
+/// Height reserved for the scales below the map, user units.
 const SCALES: f64 = 58.0;
 
-/// Widest part of the scale for a colour, user units.
+/// Maximum width of a colour in the scale, user units.
 const WIDEST: f64 = 46.0;
 
-/// Limits between colours, px, from the finest on.
+/// Limits between colours, px, in ascending order.
 const LEVELS: [f64; 10] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0];
 
-/// The colours between them, light where little is: told apart by those who see no red or no green.
+/// The colours between these limits, from light (small) to dark. They remain distinguishable with red-green colour blindness.
 pub(super) const COLOURS: [&str; 11] = [
     "#ffffe5", "#f0f9c8", "#d5eeb3", "#a9ddb7", "#73c9bd", "#45b4c2", "#2897bf", "#2073b2",
     "#234da0", "#1e2f88", "#081d58",
 ];
 
-/// Nearly all arrows are at most as long as this part of the distance between them.
+/// Length that nearly all arrows stay below, as a fraction of the distance between them.
 const ARROW_PART: f64 = 0.9;
 const NEARLY_ALL: f64 = 0.95;
 
-/// Arrows along a row at most.
+/// Maximum number of arrows in a row.
 const ARROWS: usize = 20;
 
-/// Colours for viewers in the light and in the dark, of a picture by itself; a page has its own.
+/// Light and dark colours of a standalone SVG file; the HTML page has its own style sheet.
 const STYLE: &str = "<style>\
 .field text{font:11px system-ui,sans-serif;fill:#556}\
 .field .frame,.field .tick{stroke:#99a;fill:none}\
@@ -48,20 +47,20 @@ struct Field {
     size: DVec2,
     columns: usize,
     values: Vec<Option<f64>>,
-    /// Places to be outlined.
+    /// Cells inside the outline.
     outlined: Vec<bool>,
-    /// What the outline means.
+    /// Meaning of the outline, shown in the legend.
     outline: &'static str,
     arrows: Vec<(DVec2, DVec2)>,
 }
 
-/// The uncertainty map of a camera as an SVG file of its own: standard deviation of projections
+/// The uncertainty map of a camera as a standalone SVG file: standard deviation of projections
 /// over the image, px.
 pub fn uncertainty_svg(camera: &CameraEstimate, map: &UncertaintyMap) -> String {
     of_uncertainty(camera, map).by_itself(UNCERTAIN)
 }
 
-/// The comparison of two cameras as an SVG file of its own: differences of projections over an
+/// The comparison of two cameras as a standalone SVG file: differences of projections over an
 /// image of `size_px`, px.
 pub fn comparison_svg(size_px: [u32; 2], found: &Comparison) -> String {
     let places = found.places.iter();
@@ -78,7 +77,7 @@ pub fn comparison_svg(size_px: [u32; 2], found: &Comparison) -> String {
         columns: found.columns,
         values: values.collect(),
         outlined: outlined.collect(),
-        outline: "outlined: what was compared",
+        outline: "outlined: compared region",
         arrows: arrows
             .filter_map(|(_, place)| place.map(|place| (place.pixel, place.by)))
             .collect(),
@@ -86,7 +85,7 @@ pub fn comparison_svg(size_px: [u32; 2], found: &Comparison) -> String {
     field.by_itself("Differences of two cameras over the image")
 }
 
-const UNCERTAIN: &str = "How sure the camera is over its image";
+const UNCERTAIN: &str = "Projection uncertainty over the image";
 
 /// The uncertainty map of a camera for a page.
 pub(in crate::report) fn uncertainty(camera: &CameraEstimate, map: &UncertaintyMap) -> String {
@@ -111,28 +110,28 @@ fn of_uncertainty(camera: &CameraEstimate, map: &UncertaintyMap) -> Field {
         columns: map.columns,
         values: map.sd_px.clone(),
         outlined: places.map(is_seen).collect(),
-        outline: "outlined: where corners were",
+        outline: "outlined: region with corners",
         arrows: Vec::new(),
     }
 }
 
-/// What a map of uncertainty shows, in words.
+/// The caption of an uncertainty map.
 pub(in crate::report) fn caption(map: &UncertaintyMap) -> String {
     let source = match map.source {
-        Source::Noise => "from the noise of corners alone",
-        Source::Observed => "observed: as the views agree with each other",
+        Source::Noise => "from corner noise alone",
+        Source::Observed => "observed: from the scatter between views",
     };
     let distance = match map.distance_mm {
         Some(mm) => format!("of points {mm:.0} mm away"),
         None => "of points at infinity".to_owned(),
     };
-    format!("Standard deviation of projections {distance}, along the worst direction, {source}.")
+    format!("Standard deviation of projections {distance} in the worst direction, {source}.")
 }
 
 const NAMES: [&str; 2] = ["x, px", "y, px"];
 
 impl Field {
-    /// As a file of its own.
+    /// As a standalone SVG file.
     fn by_itself(&self, shows: &str) -> String {
         let attributes = " xmlns=\"http://www.w3.org/2000/svg\" class=\"field\"";
         self.axes().svg_with(NAMES, shows, attributes, STYLE)
@@ -159,14 +158,14 @@ impl Field {
         }
         let said = match self.arrows.is_empty() {
             true => self.outline.to_owned(),
-            false => format!("arrows: {enlarged} times enlarged; {}", self.outline),
+            false => format!("arrows enlarged {enlarged} times; {}", self.outline),
         };
         let foot = levels(&self.values, axes.foot_width());
         axes.foot(SCALES, format!("{foot}<text x=\"0\" y=\"50\">{said}</text>"));
         axes
     }
 
-    /// Two corners of a place, px.
+    /// Two opposite corners of a cell, px.
     fn sides(&self, index: usize) -> [DVec2; 2] {
         let rows = self.values.len().div_ceil(self.columns.max(1));
         let side = self.size / DVec2::new(self.columns as f64, rows as f64);
@@ -174,7 +173,7 @@ impl Field {
         [place * side - 0.5, (place + 1.0) * side - 0.5]
     }
 
-    /// Lines between places that are outlined and others.
+    /// Lines between outlined cells and the others.
     fn outline_lines(&self, axes: &Axes) -> String {
         let rows = self.values.len() / self.columns.max(1);
         let is_in = |row: i64, column: i64| {
@@ -199,7 +198,7 @@ impl Field {
         format!("<path class=\"outline\" d=\"{path}\"/>")
     }
 
-    /// By how much arrows are enlarged.
+    /// Magnification of the arrows.
     fn enlarged(&self) -> f64 {
         let mut lengths: Vec<f64> = self.arrows.iter().map(|(_, by)| by.length()).collect();
         let longest = quantile(&mut lengths, NEARLY_ALL).unwrap_or(0.0).max(1e-6);
@@ -208,12 +207,12 @@ impl Field {
     }
 }
 
-/// The colour of a value, by its place in [`COLOURS`].
+/// Index in [`COLOURS`] of the colour of a value.
 fn level(value: f64) -> usize {
     LEVELS.iter().filter(|&&level| value >= level).count()
 }
 
-/// The colours that occur and what they mean, over a width.
+/// The legend of the colours that occur, drawn over `width`.
 fn levels(values: &[Option<f64>], width: f64) -> String {
     let found = values.iter().flatten().map(|&value| level(value));
     let (first, last) = found.fold((usize::MAX, 0), |(low, high), at| (low.min(at), high.max(at)));

@@ -1,12 +1,11 @@
 //! Plots as SVG.
 //!
-//! Comes in: an estimate, and what was measured of it. Goes out: a drawing, and mostly its caption.
+//! Input: an estimate, and statistics of it. Output: a drawing, usually with its caption.
 //!
-//! 1. `axes` has the frame of all plots over the image, `panels` draws dots and arrows on the target; `round_down` chooses
-//!    the scales of arrows.
-//! 2. `residuals` are over the image, the radius and the views, `board_residuals` on the target.
-//! 3. `distortion` is that of the lens, `field` a map of values over the image.
-//! 4. `target_map` shows where the corners are, `scene` cameras and targets in space.
+//! 1. `axes` draws the frame of all plots, `panels` draws dots and arrows on the target, and `round_down` chooses round scales.
+//! 2. `residuals` plots residuals by image position, radius and view; `board_residuals` plots them on the target.
+//! 3. `distortion` plots the distortion of the lens, and `field` maps values over the image.
+//! 4. `target_map` shows the measured corner offsets, and `scene` shows cameras and targets in space.
 
 mod axes;
 pub(super) mod board_residuals;

@@ -1,6 +1,5 @@
-//! Drawing of values at the corners of a target: a coloured dot at the position of each corner on
-//! its panel, and an arrow from it. All panels of a target are drawn to one scale, beside each other
-//! in rows.
+//! Drawing of values at the corners of a target: each corner has a coloured dot at its position on the panel, and an arrow.
+//! All panels of a target share one scale and are arranged in rows.
 
 use std::fmt::Write as _;
 
@@ -12,11 +11,10 @@ use deltille_core::statistics::median;
 /// Margin around every panel, user units; below, it holds the name of the panel.
 const MARGIN: f64 = 26.0;
 
-/// Greatest number of panels in a row.
+/// Maximum number of panels in a row.
 const PANELS_IN_A_ROW: usize = 5;
 
-/// Radius of a dot as a fraction of the distance between corners, and its least and greatest value,
-/// user units.
+/// Radius of a dot as a fraction of the corner spacing, and its minimum and maximum, user units.
 const DOT_PART: f64 = 0.16;
 const DOTS: [f64; 2] = [1.2, 7.0];
 
@@ -37,7 +35,7 @@ pub(super) struct Mark {
     pub is_sure: bool,
     /// CSS colour of the dot.
     pub colour: String,
-    /// Tooltip; none where it is empty.
+    /// Tooltip; omitted if empty.
     pub title: String,
 }
 
@@ -51,18 +49,17 @@ pub(super) struct Panels<'a> {
     margin: f64,
     /// User units per millimetre on the panel.
     per_mm: f64,
-    /// Usual distance of neighbouring corners, mm.
+    /// Median distance between neighbouring corners, mm.
     spacing_mm: f64,
 }
 
 impl<'a> Panels<'a> {
-    /// Lays out marks, which are sorted by panel, at the largest scale that fits a width and a height,
-    /// user units.
+    /// Lays out marks, sorted by panel, at the largest scale that fits the width and height, user units.
     pub(super) fn new(marks: &'a [Mark], width: f64, most_height: f64) -> Self {
         let panels: Vec<&[Mark]> = marks.chunk_by(|a, b| a.panel == b.panel).collect();
         let in_a_row = panels.len().clamp(1, PANELS_IN_A_ROW);
         let rows = panels.len().div_ceil(in_a_row).max(1);
-        // All panels at one scale, that of the largest. Arrows may reach to where the next corner would be.
+        // The largest panel sets the scale of all. Arrows may extend by one corner spacing.
         let largest = panels.iter().map(|marks| size_mm(marks)).fold(DVec2::ONE, DVec2::max);
         let spacing_mm = spacing_mm(marks);
         let room = DVec2::new(width / in_a_row as f64, most_height / rows as f64) - 2.0 * MARGIN;
@@ -96,7 +93,7 @@ impl<'a> Panels<'a> {
         for (index, marks) in self.panels.iter().enumerate() {
             let at = DVec2::new((index % in_a_row) as f64, (index / in_a_row) as f64) * self.cell;
             let [low, high] = extent_mm(marks);
-            // In the middle of its cell.
+            // Centred in its cell.
             let wide = (high.x - low.x) * self.per_mm;
             let left = at.x + (self.cell.x - wide) / 2.0;
             let bottom = at.y + self.cell.y - self.margin;
@@ -110,7 +107,7 @@ impl<'a> Panels<'a> {
     }
 
     /// The SVG elements of one panel. `low` is the lower left end of its marks, mm, which is drawn at
-    /// `origin`, user units; y is up on the panel and down in the picture.
+    /// `origin`, user units; y points up on the panel and down in the SVG.
     fn panel(&self, marks: &[Mark], low: DVec2, origin: DVec2, enlarged: f64) -> String {
         let up = DVec2::new(1.0, -1.0);
         let [least, most] = DOTS;
@@ -150,7 +147,7 @@ fn size_mm(marks: &[Mark]) -> DVec2 {
     high - low
 }
 
-/// Median distance of marks that follow each other in a row of a panel, mm; 1 mm where none do.
+/// Median distance between consecutive marks in a row of a panel, mm; 1 mm if no row has two marks.
 fn spacing_mm(marks: &[Mark]) -> f64 {
     let pairs = marks.windows(2).filter(|pair| {
         (pair[0].panel, pair[0].row, pair[0].col + 1) == (pair[1].panel, pair[1].row, pair[1].col)

@@ -1,7 +1,7 @@
-//! Plots of the residuals of a camera over the image, the radius and the views, each as an SVG.
+//! Plots of the residuals of a camera by image position, radius and view, each as an SVG.
 //!
-//! Outliers are drawn in red and take no part in ranges, means and rings. A corner whose residual is
-//! larger than the range of a plot is a ring on its rim, so that it is not overlooked.
+//! Outliers are drawn in red and excluded from ranges, means and ring averages. A corner whose residual exceeds the range of a
+//! plot appears as a ring on the border of the plot.
 
 use glam::DVec2;
 
@@ -13,16 +13,16 @@ use deltille_calibrate::{CameraEstimate, Corner};
 /// Height of the legend below a map, user units.
 const FOOT: f64 = 58.0;
 
-/// Most dots of a scatter plot: more only make the page heavy.
+/// Maximum number of dots in a scatter plot: more only enlarge the file.
 const MOST_DOTS: usize = 6000;
 
-/// Radius of the ring that marks a corner beyond the rim of a plot, user units.
+/// Radius of the ring that marks a corner outside a plot, user units.
 const BEYOND: f64 = 3.0;
 
 /// Bins of the histogram on either side of zero.
 const BINS: usize = 20;
 
-/// Most bars of the plot of views; of more views, each bar is the worst of several.
+/// Maximum number of bars in the plot of views; with more views, each bar is the worst of several.
 const MOST_BARS: usize = 200;
 
 /// Bins of the radial curve.
@@ -40,7 +40,7 @@ fn range_px(camera: &CameraEstimate) -> f64 {
     (4.0 * rms).max(1e-6)
 }
 
-/// Every n-th corner of a camera, with n such that at most [`MOST_DOTS`] are left.
+/// Every n-th corner of a camera, where n leaves at most [`MOST_DOTS`].
 fn thinned(camera: &CameraEstimate) -> impl Iterator<Item = &Corner> {
     let step = camera.corner_count().div_ceil(MOST_DOTS).max(1);
     camera.corners().step_by(step)
@@ -49,13 +49,13 @@ fn thinned(camera: &CameraEstimate) -> impl Iterator<Item = &Corner> {
 /// Scatter plot of the residuals of all corners, px.
 pub(in crate::report) fn scatter(camera: &CameraEstimate, survey: &Survey) -> String {
     let size = frame(survey.size_px);
-    // As many pixels in all directions, however wide the frame is.
+    // The scale is equal in both directions, independent of the aspect ratio of the frame.
     let range = range_px(camera) * size / size.min_element();
     let mut axes = Axes::new(size, [-range.x, range.x], [-range.y, range.y]);
     for axis in [DVec2::X, DVec2::Y] {
         axes.line(&[-range * axis, range * axis], "guide");
     }
-    // Residuals run down in the image.
+    // In the image, residuals point down; in the plot, up.
     let up = |corner: &Corner| corner.residual * DVec2::new(1.0, -1.0);
     for corner in thinned(camera) {
         if (corner.residual / range).abs().max_element() <= 1.0 {
@@ -63,17 +63,17 @@ pub(in crate::report) fn scatter(camera: &CameraEstimate, survey: &Survey) -> St
         }
     }
     for corner in camera.corners() {
-        // On the way from the middle, where it leaves the plot.
+        // The point at which the line from the centre leaves the plot.
         let beyond = (corner.residual / range).abs().max_element();
         if beyond > 1.0 {
             axes.dot(up(corner) / beyond, BEYOND, "beyond");
         }
     }
-    axes.svg(["residual to the right, px", "residual upwards, px"], "Residuals of all corners")
+    axes.svg(["residual in x, px", "residual upwards, px"], "Residuals of all corners")
 }
 
-/// Histogram of the residuals of both coordinates, px, with the normal distribution of the same
-/// standard deviation.
+/// Histogram of the residuals of both axes, px, with the normal distribution of the same standard
+/// deviation.
 pub(in crate::report) fn histogram(camera: &CameraEstimate, survey: &Survey) -> String {
     let range = range_px(camera);
     let width = range / BINS as f64;
@@ -102,7 +102,7 @@ pub(in crate::report) fn histogram(camera: &CameraEstimate, survey: &Survey) -> 
     let curve = (0..=100).map(|i| f64::from(i) / 50.0 * range - range);
     let curve: Vec<DVec2> = curve.map(|x| DVec2::new(x, normal(x))).collect();
     axes.line(&curve, "curve");
-    axes.svg(["residual of a coordinate, px", "% of coordinates"], "Histogram of residuals")
+    axes.svg(["residual per axis, px", "% of residuals"], "Histogram of residuals")
 }
 
 /// Number of columns and of rows of the maps.
@@ -132,7 +132,7 @@ pub(in crate::report) fn residual_map(survey: &Survey) -> (String, String) {
     let cell = survey.size_px.x / survey.cells[0] as f64;
     let means = || survey.means_px.iter().flatten();
     let longest = means().map(|cell| cell.mean_px.length()).fold(0.0, f64::max);
-    // Round numbers, to be read in the caption and below.
+    // Round numbers for the caption and the legend.
     let enlarged =
         if longest > 0.0 { round_down(ARROW_CELLS * cell / longest).max(1.0) } else { 1.0 };
     let mut axes = Axes::of_image(survey.size_px);
@@ -140,7 +140,7 @@ pub(in crate::report) fn residual_map(survey: &Survey) -> (String, String) {
         let Some(mean) = mean else { continue };
         let foot = middle(survey, index);
         let arrow = within(survey, foot, mean.mean_px * enlarged);
-        // Means that chance explains are pale.
+        // Means that noise explains are pale.
         let chance = mean.mean_px.length() < 3.0 * mean.sd_px;
         axes.line(&[foot, foot + arrow], if chance { "arrow pale" } else { "arrow" });
         axes.dot(foot, 1.6, "foot");
@@ -150,14 +150,14 @@ pub(in crate::report) fn residual_map(survey: &Survey) -> (String, String) {
         let end = example * enlarged * axes.scale().x;
         let key = format!(
             "<path class=\"arrow\" d=\"M0 13H{end:.1}\"/><text x=\"0\" y=\"31\">{example} px</text>\
-             <path class=\"arrow pale\" d=\"M110 13H{:.1}\"/><text x=\"110\" y=\"31\">no more than chance makes</text>",
+             <path class=\"arrow pale\" d=\"M110 13H{:.1}\"/><text x=\"110\" y=\"31\">not significant</text>",
             110.0 + end
         );
         axes.foot(FOOT, key);
     }
     let caption = format!(
-        "Mean residual (seen less predicted) of each part of the image, {enlarged} times enlarged. A pattern of long arrows \
-         is the lens's, which the model does not hold."
+        "Mean residual (observed minus predicted) in each cell of the image, enlarged {enlarged} times. A pattern of long \
+         arrows shows distortion that the model does not describe."
     );
     (axes.svg(["x, px", "y, px"], "Mean residuals over the image"), caption)
 }
@@ -187,7 +187,7 @@ pub(in crate::report) fn coverage(survey: &Survey) -> String {
 }
 
 /// Length of each residual, px, against the distance of its corner from the principal point, px,
-/// and the RMS per coordinate of concentric rings.
+/// and the RMS per axis of concentric rings.
 pub(in crate::report) fn against_radius(camera: &CameraEstimate, survey: &Survey) -> String {
     let radius = |corner: &Corner| camera.camera.radius_px(corner.pixel);
     let error = |corner: &Corner| corner.residual.x.hypot(corner.residual.y);
@@ -223,8 +223,8 @@ pub(in crate::report) fn against_radius(camera: &CameraEstimate, survey: &Survey
     axes.svg(["distance from the principal point, px", "error, px"], "Error against radius")
 }
 
-/// RMS of each view, px, against the tilt of the board, degrees, or for solids, whose faces are seen
-/// at all tilts at once, against the distance of the target, mm; and the caption.
+/// RMS of each view, px, against the tilt of the board, degrees, and the caption. For solids, whose faces have many tilts at
+/// once, the RMS is drawn against the distance of the target, mm.
 pub(in crate::report) fn against_place(
     camera: &CameraEstimate,
     survey: &Survey,
@@ -236,14 +236,15 @@ pub(in crate::report) fn against_place(
             10.0,
             "tilt of the board, °",
             "Error against tilt",
-            "The rms of each view over its tilt: steep views are blurred and coarse, and all tilts should occur.",
+            "The rms of each view against its tilt. Steeply tilted views have fewer pixels per cell and more blur; the views \
+            should cover all tilts.",
         ),
         None => (
             survey.views.iter().map(|view| view.distance_mm).collect(),
             1.0,
             "distance of the target, mm",
             "Error against distance",
-            "The rms of each view over the distance of the target: near and far should occur.",
+            "The rms of each view against the distance of the target. The views should cover near and far.",
         ),
     };
     let farthest = places.iter().copied().fold(least, f64::max);
@@ -256,13 +257,13 @@ pub(in crate::report) fn against_place(
     (axes.svg([name, "rms of the view, px"], shows), caption)
 }
 
-/// RMS of each view, px, in their order, and that of all as a line.
+/// RMS of each view, px, in order, with the overall RMS as a line.
 pub(in crate::report) fn of_views(camera: &CameraEstimate, survey: &Survey) -> String {
     let views = &camera.views;
     let worst = views.iter().map(|view| view.rms_px).fold(1e-6, f64::max);
     let mut axes =
         Axes::new(frame(survey.size_px), [0.5, views.len() as f64 + 0.5], [0.0, 1.1 * worst]);
-    // Of many views each bar is the worst of several.
+    // With many views, each bar is the worst of several.
     let step = views.len().div_ceil(MOST_BARS).max(1);
     for (bar, views) in views.chunks(step).enumerate() {
         let px = views.iter().map(|view| view.rms_px).fold(0.0, f64::max);
@@ -273,5 +274,5 @@ pub(in crate::report) fn of_views(camera: &CameraEstimate, survey: &Survey) -> S
     }
     let all = DVec2::new(views.len() as f64 + 0.5, camera.rms_px);
     axes.line(&[DVec2::new(0.5, camera.rms_px), all], "curve");
-    axes.svg(["view, in their order", "rms of the view, px"], "Error of each view")
+    axes.svg(["view, in order", "rms of the view, px"], "Error of each view")
 }

@@ -1,5 +1,5 @@
-//! Drawings of cameras and targets in space, in parallel projection: one with the cameras fixed,
-//! one with the target fixed.
+//! Drawings of cameras and targets in space, in parallel projection: one in the frame of the cameras, one in the frame of the
+//! target.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -14,26 +14,26 @@ use deltille_core::camera::{Camera, Pose};
 use deltille_core::polygon::hull;
 use deltille_core::statistics::median;
 
-/// Margin of the picture, user units.
+/// Margin of the drawing, user units.
 const MARGIN: f64 = 36.0;
 
-/// Most views of a camera that are drawn, spread evenly over all of them: more hide each other.
+/// Maximum number of views drawn per camera, evenly sampled: more would hide each other.
 const MOST_VIEWS: usize = 60;
 
-/// Length of the pyramid that stands for a camera, as a fraction of the median distance of the
-/// target: of a fixed camera, and of one of many poses around a fixed target.
+/// Length of the pyramid of a camera as a fraction of the median distance of the target: for a fixed camera, and for one of
+/// many poses around a fixed target.
 const CAMERA_PART: f64 = 0.12;
 const SMALL_CAMERA_PART: f64 = 0.07;
 
-/// Of more views than this, the areas of the target are drawn nearly transparent.
+/// Number of views above which the target is drawn nearly transparent.
 const FEW_VIEWS: usize = 12;
 
 /// The frame in which a scene is drawn, and the direction from which it is viewed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::report) enum Fixed {
-    /// The cameras, and the viewer stands above and behind the first.
+    /// The cameras are fixed; the viewer is above and behind the first.
     Rig,
-    /// The target, and the viewer stands before and below it.
+    /// The target is fixed; the viewer is in front of and below it.
     Target,
 }
 
@@ -51,13 +51,13 @@ impl Fixed {
     }
 }
 
-/// Half the width of a drawn camera over its length, where the lens has no ray ahead at the corners
-/// of its image, or a wider one: that of a field of 90°.
+/// Maximum ratio of half the width of a drawn camera to its length, for a field of view of 90°. It also applies if the lens has
+/// no forward ray at the corners of its image.
 const WIDE: f64 = 1.0;
 
 /// A polygon in space.
 struct Shape {
-    /// Its corners, mm, in the frame that stays fixed: of the rig, or of the target.
+    /// Its corners, mm, in the fixed frame: of the rig, or of the target.
     corners: Vec<DVec3>,
     /// CSS class.
     class: &'static str,
@@ -65,8 +65,8 @@ struct Shape {
     title: String,
 }
 
-/// The scene as an SVG of the size of the other plots of a camera with this image, px; empty where
-/// nothing was seen.
+/// The scene as an SVG. It has the size of the other plots of a camera with this image size, px; empty if the target was
+/// not seen.
 pub(in crate::report) fn drawing(estimate: &Estimate, fixed: Fixed, image_px: DVec2) -> String {
     let [_, size_px] = Axes::bare(image_px).bounds();
     let (width, height) = (size_px.x, size_px.y);
@@ -82,7 +82,7 @@ pub(in crate::report) fn drawing(estimate: &Estimate, fixed: Fixed, image_px: DV
         Fixed::Target => around_target(estimate, SMALL_CAMERA_PART * depth),
     };
     let turned = |point: DVec3| fixed.turned(point);
-    // What is far away first, so that what is near covers it.
+    // Far polygons come first, so near ones cover them.
     shapes.sort_by(|a, b| turned(b.middle()).z.total_cmp(&turned(a.middle()).z));
     let flat = |point: &DVec3| turned(*point).truncate();
     let all = || shapes.iter().flat_map(|shape| &shape.corners).map(flat);
@@ -148,7 +148,7 @@ impl Shape {
 }
 
 /// The field of view of a camera as a pyramid: four sides from the optical centre, and the base at
-/// the distance `long`, mm, on its axis. `frame_from_rig` takes it to the frame that is drawn.
+/// the distance `long`, mm, on its axis. `frame_from_rig` transforms it into the drawn frame.
 fn pyramid(camera: &CameraEstimate, frame_from_rig: &Pose, long: f64) -> Vec<Shape> {
     let frame_from_camera = frame_from_rig.after(&camera.camera_from_rig.inverse());
     let base = corners_ahead(&camera.camera)
@@ -162,8 +162,8 @@ fn pyramid(camera: &CameraEstimate, frame_from_rig: &Pose, long: f64) -> Vec<Sha
     sides.chain([shape(base.to_vec(), "camera-base")]).collect()
 }
 
-/// In the target frame: every panel, by the view that shows most of it, and all poses of the cameras
-/// as pyramids of the length `long`, mm.
+/// The scene in the target frame: every panel as outlined by the view with most of its corners, and all camera poses as
+/// pyramids of length `long`, mm.
 fn around_target(estimate: &Estimate, long: f64) -> Vec<Shape> {
     let worst = estimate.frames.iter().map(|frame| frame.rms_px).fold(0.0, f64::max);
     let mut widest: BTreeMap<PanelRef, (f64, Shape)> = BTreeMap::new();
@@ -206,7 +206,7 @@ fn corners_ahead(camera: &Camera) -> [DVec2; 4] {
     })
 }
 
-/// The outlines of the panels in all views, in the rig frame, as far as corners were seen.
+/// The outlines of the panels in all views, in the rig frame, limited to the corners that were seen.
 fn targets(estimate: &Estimate) -> Vec<Shape> {
     let worst = estimate.frames.iter().map(|frame| frame.rms_px).fold(0.0, f64::max);
     let of_camera = |camera: &'_ CameraEstimate| {
@@ -222,8 +222,8 @@ fn targets(estimate: &Estimate) -> Vec<Shape> {
     estimate.cameras.iter().flat_map(of_camera).collect()
 }
 
-/// The panels that a view shows, in the rig frame: the convex hull of the inliers of each, placed on
-/// the plane of the panel by the pose of the view.
+/// The panels in a view, in the rig frame: the convex hull of the inliers of each panel, on the plane that follows from the
+/// pose of the view.
 fn panels(
     estimate: &Estimate,
     camera: &CameraEstimate,

@@ -1,5 +1,5 @@
-//! Map of the measured corner offsets of a target: arrows for offsets in the plane, colours for
-//! those above or below it.
+//! Map of the measured corner offsets of a target: arrows show offsets in the plane, colours show
+//! offsets out of the plane.
 
 use std::fmt::Write as _;
 
@@ -8,23 +8,23 @@ use crate::report::plots::round_down::round_down;
 use deltille_calibrate::{CornerOffset, TargetMap};
 use deltille_core::statistics::quantile;
 
-/// Width of the picture, user units.
+/// Width of the map, user units.
 const WIDTH: f64 = 720.0;
 
-/// Room beside and below the panels for the scales, user units.
+/// Space beside the panels, and below them for the scales, user units.
 const MARGIN: f64 = 26.0;
 const SCALES: f64 = 44.0;
 
-/// Nearly all arrows are at most as long as this part of the distance between corners.
+/// Length that nearly all arrows stay below, as a fraction of the corner spacing.
 const ARROW_PART: f64 = 0.9;
 const NEARLY_ALL: f64 = 0.95;
 
-/// Colours of heights: below, in the plane, above; told apart by those who see no red or no green.
+/// Colours of heights: below, in the plane, above. They remain distinguishable with red-green colour blindness.
 const BELOW: [f64; 3] = [217.0, 119.0, 6.0];
 const LEVEL: [f64; 3] = [235.0, 235.0, 235.0];
 const ABOVE: [f64; 3] = [31.0, 111.0, 178.0];
 
-/// Colours for viewers in the light and in the dark; a page with its own overrides nothing here.
+/// Light and dark colours of a standalone SVG file. They match the style sheet of the HTML page.
 const STYLE: &str = "\
 .target-map text{font:11px system-ui,sans-serif;fill:#556}\
 .target-map .offset{stroke:#c21f2b;stroke-width:1.6;fill:none;stroke-linecap:round}\
@@ -32,12 +32,12 @@ const STYLE: &str = "\
 .target-map .place{stroke:#667;stroke-width:.6}\
 @media(prefers-color-scheme:dark){.target-map text{fill:#a9b2bd}.target-map .offset{stroke:#ff7b72}}";
 
-/// The map as an SVG file of its own.
+/// The map as a standalone SVG file.
 pub fn target_map_svg(map: &TargetMap) -> String {
     drawing(map, " xmlns=\"http://www.w3.org/2000/svg\"")
 }
 
-/// The picture; `space` is an attribute that files of their own need.
+/// The map; `space` is the namespace attribute that standalone files need.
 pub(in crate::report) fn drawing(map: &TargetMap, space: &str) -> String {
     let mut marks: Vec<Mark> = map.corners().iter().map(|corner| mark(map, corner)).collect();
     let panels = Panels::new(&marks, WIDTH, f64::INFINITY);
@@ -68,10 +68,10 @@ fn mark(map: &TargetMap, corner: &CornerOffset) -> Mark {
     }
 }
 
-/// By how much arrows are enlarged, and which heights have full colours.
+/// Magnification of the arrows, and the height with full colour.
 struct Scale {
     enlarged: f64,
-    /// An offset to be shown below, mm.
+    /// The offset shown in the legend, mm.
     example_mm: f64,
     height_mm: f64,
 }
@@ -98,14 +98,14 @@ impl Scale {
         format!("rgb({},{},{})", mix(0), mix(1), mix(2))
     }
 
-    /// What an arrow and a colour mean, from a height of the picture on.
+    /// The legend of arrows and colours, starting at the height `top`.
     fn drawn(&self, per_mm: f64, top: f64) -> String {
         let (y, text) = (top + 14.0, top + 34.0);
         let end = MARGIN + self.example_mm * self.enlarged * per_mm;
         let mut drawn = format!(
             "<line class=\"offset\" x1=\"{MARGIN}\" y1=\"{y:.1}\" x2=\"{end:.1}\" y2=\"{y:.1}\"/>\
-             <text x=\"{MARGIN}\" y=\"{text:.1}\">{} mm in the plane, {} times enlarged; grey: no more than \
-             chance</text>",
+             <text x=\"{MARGIN}\" y=\"{text:.1}\">{} mm in the plane, enlarged {} times; grey: not \
+             significant</text>",
             self.example_mm, self.enlarged
         );
         let (left, steps) = (WIDTH - MARGIN - 210.0, 21);

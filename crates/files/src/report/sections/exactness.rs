@@ -1,12 +1,11 @@
-//! Plots of residuals and of the uncertainty of projections, over the image, the target and the
-//! views.
+//! Plots of residuals and of projection uncertainty over the image, the target and the views.
 
 use crate::report::html;
 use crate::report::measures::survey::Survey;
 use crate::report::plots::{board_residuals, field, residuals};
 use deltille_calibrate::{CameraEstimate, Estimate, Source};
 
-/// Residuals over the image, the target, the radius and the views, and the coverage of the image.
+/// The section with residuals by image position, target corner, radius and view, and the coverage of the image.
 pub(in crate::report) fn residuals(
     estimate: &Estimate,
     camera: &CameraEstimate,
@@ -17,28 +16,29 @@ pub(in crate::report) fn residuals(
     figures.extend(board_residuals::plot(estimate, camera, survey));
     figures.push((
         residuals::scatter(camera, survey),
-        "Residuals of all corners: a round cloud is noise, anything else is not. Rings on the rim lie beyond it."
+        "Residuals of all corners. A round cloud is noise; any other shape is a systematic error. Rings on the border are \
+        corners outside the plot."
             .to_owned(),
     ));
     figures.push((
         residuals::histogram(camera, survey),
-        "How many residuals of a coordinate are how large, and the normal distribution of the same deviation."
+        "Histogram of the residuals per axis, and the normal distribution with the same standard deviation."
             .to_owned(),
     ));
     figures.push((
         residuals::against_radius(camera, survey),
-        "Errors of corners by their place in the image, and the rms of rings per coordinate, which should be level. \
-         Rings on the rim lie beyond it."
+        "Residuals of corners against the distance from the principal point, and the rms per axis of concentric rings, which \
+         should be constant. Rings on the border are corners outside the plot."
             .to_owned(),
     ));
     figures.push((
         residuals::coverage(survey),
-        "Corners in each part of the image. Where there are none (red) distortion is extrapolated."
+        "Number of corners in each cell of the image. In empty cells (red) distortion is extrapolated."
             .to_owned(),
     ));
     figures.push((
         residuals::of_views(camera, survey),
-        "The rms of each view in their order: steps show that something changed, peaks a bad picture.".to_owned(),
+        "The rms of each view, in order. A step means that something changed; a peak means a bad image.".to_owned(),
     ));
     let (place, caption) = residuals::against_place(camera, survey);
     figures.push((place, caption.to_owned()));
@@ -55,7 +55,7 @@ pub(in crate::report) fn uncertainty(camera: &CameraEstimate) -> String {
     let told = maps.iter().filter_map(|map| {
         let sd = camera.projection_sd_px(map.distance_mm, map.source)?;
         let source = match map.source {
-            Source::Noise => "from noise",
+            Source::Noise => "corner noise",
             Source::Observed => "observed",
         };
         let distance = map.distance_mm.map_or("infinity".to_owned(), |mm| format!("{mm:.0} mm"));
@@ -64,11 +64,11 @@ pub(in crate::report) fn uncertainty(camera: &CameraEstimate) -> String {
         ))
     });
     let body = format!(
-        "{}<div class=\"wide-table\"><table class=\"plain\"><tr><th>distance</th><th class=\"words\">deviation</th><th>px</th></tr>{}</table></div>\
-         <p class=\"note\">Standard deviation of a coordinate where corners were, after the motion of the camera that explains \
-         the corners best.</p>",
+        "{}<div class=\"wide-table\"><table class=\"plain\"><tr><th>distance</th><th class=\"words\">1σ from</th><th>px</th></tr>{}</table></div>\
+         <p class=\"note\">Standard deviation per axis within the region with corners, after the camera motion that fits the \
+         corners best.</p>",
         html::figures(drawn),
         told.collect::<String>()
     );
-    html::section("How sure projections are", &body)
+    html::section("Projection uncertainty", &body)
 }

@@ -5,7 +5,7 @@ use crate::report::html::escaped;
 use crate::report::sections::numbers::rounded;
 use deltille_calibrate::CameraEstimate;
 
-/// A key figure with its unit, as HTML, and what it is.
+/// A key figure with its unit, as HTML, and its label.
 type Figure = (String, &'static str);
 
 /// The key figures of a camera.
@@ -17,7 +17,7 @@ pub(in crate::report) fn of_camera(
     let camera = &found.camera;
     let model = found.model.map_or("fixed".to_owned(), |model| model.to_string());
     let mut cells = vec![
-        (format!("{:.4} px", found.rms_px), "rms of a coordinate"),
+        (format!("{:.4} px", found.rms_px), "rms per axis"),
         (escaped(&model), "model"),
         (format!("{}\u{a0}×\u{a0}{}", camera.width, camera.height), "image, px"),
         (found.views.len().to_string(), "views"),
@@ -27,7 +27,7 @@ pub(in crate::report) fn of_camera(
         cells.insert(1, (format!("{:.4} px", found.inlier_rms_px()), "rms without outliers"));
     }
     if let Some(held_out) = report.held_out(index) {
-        let name = "rms on views held out";
+        let name = "rms on held-out views";
         cells.insert(1, (format!("{:.4} px", held_out.rms_px), name));
     }
     cells.extend(of_print(report).filter(|_| !report.is_rig()));
@@ -38,7 +38,7 @@ pub(in crate::report) fn of_camera(
 pub(in crate::report) fn of_rig(report: &Report) -> Vec<Figure> {
     let found = report.estimate;
     let mut cells = vec![
-        (format!("{:.4} px", found.rms_px), "rms of a coordinate"),
+        (format!("{:.4} px", found.rms_px), "rms per axis"),
         (found.cameras.len().to_string(), "cameras"),
         (found.frames.len().to_string(), "frames"),
         (found.corner_count().to_string(), "corners"),
@@ -47,13 +47,13 @@ pub(in crate::report) fn of_rig(report: &Report) -> Vec<Figure> {
         cells.insert(1, (format!("{:.4} px", found.inlier_rms_px()), "rms without outliers"));
     }
     if let Some(held_out) = &found.held_out {
-        cells.insert(1, (format!("{:.4} px", held_out.rms_px), "rms on frames held out"));
+        cells.insert(1, (format!("{:.4} px", held_out.rms_px), "rms on held-out frames"));
     }
     cells.extend(of_print(report));
     cells
 }
 
-/// The ink spread of the print, where it was measured together with its deviation.
+/// The ink spread of the print, if it was measured together with its standard deviation.
 fn of_print(report: &Report) -> Option<Figure> {
     let (um, deviation) = report.print.ink.and_then(|ink| ink.um.zip(ink.um_deviation))?;
     let (um, deviation) = rounded(um, Some(deviation));

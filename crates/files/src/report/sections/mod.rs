@@ -1,12 +1,12 @@
 //! Sections of the page: a headline with tables and plots.
 //!
-//! Comes in: the report. Goes out: HTML.
+//! Input: the report. Output: HTML.
 //!
-//! 1. `numbers` rounds values to their deviations, and aligns them in columns.
-//! 2. `key_figures` is the row of boxes at the top.
-//! 3. `exactness` has the plots of residuals and of the uncertainty of projections.
-//! 4. `models` compares lenses, `parameters` lists what was estimated.
-//! 5. `views` lists them, the worst as pictures; `rig` has the poses of cameras, panels, targets and frames.
+//! 1. `numbers` rounds values according to their standard deviations and aligns them in columns.
+//! 2. `key_figures` makes the row of boxes at the top.
+//! 3. `exactness` plots residuals and projection uncertainty.
+//! 4. `models` compares lens models, and `parameters` lists the estimated parameters.
+//! 5. `views` lists all views and shows the worst as images; `rig` lists poses of cameras, panels and targets, and the frames.
 
 pub(super) mod exactness;
 pub(super) mod key_figures;

@@ -3,13 +3,13 @@
 use crate::report::html::{escaped, meter};
 use deltille_calibrate::{CameraEstimate, Candidate, Comparison, Region};
 
-/// A model's camera against the one that was found.
+/// Difference between the camera of a model and the camera of the page.
 struct Against {
     rms_px: f64,
     largest_px: f64,
 }
 
-/// The table of models of a camera; empty where none were tried.
+/// The table of models of a camera; empty if no models were compared.
 pub(in crate::report) fn section(camera: &CameraEstimate, tried: &[Candidate]) -> String {
     if tried.is_empty() {
         return String::new();
@@ -19,35 +19,35 @@ pub(in crate::report) fn section(camera: &CameraEstimate, tried: &[Candidate]) -
     let best = tried.iter().find(|one| one.chosen).map(|one| one.model);
     let told = match (best, camera.model) {
         (Some(best), Some(own)) if best == own => {
-            format!("{own} is the smallest that holds the lens.")
+            format!("{own} is the simplest adequate model for this lens.")
         }
         (Some(best), Some(own)) => match tried.iter().find(|one| one.model == own) {
             Some(one) if one.holds => {
-                format!("{own} holds the lens; {best} does so with fewer parameters, or surer.")
+                format!("{own} describes the lens; {best} does so with fewer or better determined parameters.")
             }
-            Some(_) => format!("{own} was taken, and {best} holds the lens better: try it."),
+            Some(_) => format!("{own} was used, but {best} describes the lens better: try it."),
             None => String::new(),
         },
         _ => String::new(),
     };
     format!(
         "<section><h2>Models</h2><p>{}</p><div class=\"wide-table\"><table class=\"plain models\"><tr>\
-         <th>model</th><th>parameters</th><th>held out, px</th><th>its own views, px</th>\
-         <th>differs by, px</th><th>at most, px</th><th></th></tr>{}</table></div><p class=\"note\">Each was found from two thirds of some views \
-         and held against the others, where only poses are found: a model that is too small leaves more there, one that \
-         is too large does not leave less. The difference (rms, and the largest) is that of projections at infinity from the \
-         camera of this page, where corners were, after the turn that makes it least; that of the model of this page is what fewer views make.</p></section>\n",
+         <th>model</th><th>parameters</th><th>held-out rms, px</th><th>training rms, px</th>\
+         <th>difference, px</th><th>largest, px</th><th></th></tr>{}</table></div><p class=\"note\">Each model was calibrated from two \
+         thirds of a sample of the views and evaluated on the rest, where only poses are estimated. A model with too few parameters has \
+         a larger held-out rms; one with too many does not reduce it. The differences (rms and largest) compare projections at infinity with those of \
+         the camera of this page, within the region with corners, after the rotation that minimizes them. For the model of this page they show the effect of using fewer views.</p></section>\n",
         escaped(&told),
         rows.collect::<String>()
     )
 }
 
-/// A model in the table; `worst` is the largest RMS on views held out, px.
+/// A row of the table; `worst` is the largest held-out RMS, px.
 fn row(camera: &CameraEstimate, one: &Candidate, worst: f64) -> String {
     let own = camera.model == Some(one.model);
     let held_out = one
         .held_out_px
-        .map_or("no camera".to_owned(), |px| format!("{px:.4}{}", meter(px / worst)));
+        .map_or("did not converge".to_owned(), |px| format!("{px:.4}{}", meter(px / worst)));
     let rms =
         one.found.as_ref().map_or("–".to_owned(), |of| format!("{:.4}", of.inlier_rms_px()));
     let against = one.found.as_ref().and_then(|of| against(camera, of));
@@ -55,10 +55,10 @@ fn row(camera: &CameraEstimate, one: &Candidate, worst: f64) -> String {
         [format!("{:.3}", of.rms_px), format!("{:.2}", of.largest_px)]
     });
     let notes = [
-        (own, "of this page"),
-        (one.chosen, "smallest that holds"),
-        (one.holds && !one.chosen, "as good"),
-        (one.held_out_px.is_some() && !one.is_stable, "parameters not told apart"),
+        (own, "this page"),
+        (one.chosen, "simplest adequate model"),
+        (one.holds && !one.chosen, "equally good"),
+        (one.held_out_px.is_some() && !one.is_stable, "ill-conditioned parameters"),
     ];
     let notes: Vec<&str> =
         notes.iter().filter(|(is_so, _)| *is_so).map(|(_, note)| *note).collect();

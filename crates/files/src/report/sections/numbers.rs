@@ -1,8 +1,7 @@
 //! Columns of numbers in tables, aligned at the decimal point.
 //!
-//! Values that are rounded to two digits of their deviation have different numbers of decimal
-//! places. Digits are equally wide, so that the part from the decimal point on has the width of the
-//! longest one in its column:
+//! Values rounded to two digits of their standard deviation have different numbers of decimal places. All digits have the
+//! same width, so the part from the decimal point on is given the width of the longest fraction in its column:
 //!
 //! ```text
 //!      899.97
@@ -12,8 +11,8 @@
 
 use deltille_core::words::places;
 
-/// The cells of a column, from its texts. Numbers are aligned at the decimal point, and those without
-/// one end before it; texts that are no numbers, such as a dash, are right-aligned.
+/// The cells of a column of texts. Numbers are aligned at the decimal point; integers end before it. Other texts, such as a
+/// dash, are right-aligned.
 pub(super) fn aligned(texts: &[String]) -> Vec<String> {
     let longest = texts.iter().filter(|text| is_number(text)).map(|text| split(text).1.len()).max();
     // A decimal point is about half as wide as a digit.
@@ -30,23 +29,23 @@ pub(super) fn aligned(texts: &[String]) -> Vec<String> {
     texts.iter().map(cell).collect()
 }
 
-/// Whether a text begins as a number does, with a digit after a minus if there is one.
+/// Whether a text begins with a digit or with a minus and a digit.
 fn is_number(text: &str) -> bool {
     text.trim_start_matches('−').starts_with(|c: char| c.is_ascii_digit())
 }
 
-/// A number before its decimal point, and from there on.
+/// Splits a number before its decimal point.
 fn split(number: &str) -> (&str, &str) {
     number.split_at(number.find('.').unwrap_or(number.len()))
 }
 
-/// A value with two digits of its deviation, and the deviation.
+/// A value rounded to two digits of its standard deviation, and the standard deviation.
 pub(super) fn rounded(value: f64, sd: Option<f64>) -> (String, String) {
     let sign = |text: String| text.replace('-', "−");
     match sd {
         Some(sd) if sd > 0.0 && sd.is_finite() => {
             let places = places(sd);
-            // Nothing but zeros has no sign.
+            // Zero has no sign.
             let value = if 2.0 * value.abs() < 0.1_f64.powi(places as i32) { 0.0 } else { value };
             (sign(format!("{value:.places$}")), format!("{sd:.places$}"))
         }
@@ -59,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_of_a_column_have_fractions_of_one_width() {
+    fn fractions_in_a_column_have_equal_width() {
         let texts = ["899.97", "−0.0012", "12", "kept", "", "–"].map(str::to_owned);
         let cells = aligned(&texts);
         let fraction = |whole: &str, fraction: &str| {

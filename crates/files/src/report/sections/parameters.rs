@@ -7,19 +7,19 @@ use crate::report::sections::numbers::{aligned, rounded};
 use deltille_calibrate::{CameraEstimate, Parameter, Source};
 use deltille_core::camera::{Lens, SplineGrid};
 
-/// More parameters than this have their correlations in small print.
+/// Number of parameters above which correlations are in small print.
 const FEW: usize = 12;
 
-/// Correlations from here on are drawn in a blue on which white is read better than ink.
+/// Correlation above which the cell is so blue that white text is more legible than dark text.
 const STRONG: f64 = 0.85;
 
-/// Parameters with their deviations, and their correlations.
+/// The section with the parameters, their standard deviations and their correlations.
 pub(in crate::report) fn section(camera: &CameraEstimate) -> String {
     if let Lens::Spline(spline) = &camera.camera.lens {
         let SplineGrid { degree, columns, rows, fov_x_deg } = spline.grid();
         let told = format!(
-            "<p>The lens is a spline of degree {degree} with {columns} × {rows} knots over {fov_x_deg}° across. \
-             Single knots mean nothing by themselves: see how sure projections are.</p>"
+            "<p>The lens is a spline of degree {degree} with {columns} × {rows} knots over a horizontal field of view of {fov_x_deg}°. \
+             Individual knots have no physical meaning: see the projection uncertainty instead.</p>"
         );
         return html::section("Parameters", &told);
     }
@@ -42,8 +42,8 @@ pub(in crate::report) fn section(camera: &CameraEstimate) -> String {
     });
     let rows: String = rows.collect();
     let heads = match is_observed {
-        true => "<th>± from noise</th><th>± observed</th>",
-        false => "<th>± from noise</th>",
+        true => "<th>1σ from noise</th><th>1σ observed</th>",
+        false => "<th>1σ from noise</th>",
     };
     let names: Vec<&str> = camera.found().collect();
     let mut matrix = String::new();
@@ -54,12 +54,12 @@ pub(in crate::report) fn section(camera: &CameraEstimate) -> String {
             let cells = (0..names.len()).map(|j| {
                 let c = camera.correlation(i, j);
                 let hue = if c < 0.0 { "var(--below)" } else { "var(--above)" };
-                // Ink is hard to read on the full blue.
+                // Dark text is hard to read on full blue.
                 let strong = if c > STRONG { " class=\"strong\"" } else { "" };
                 let share = (100.0 * c.abs()).round();
                 format!(
                     "<td{strong} style=\"background:color-mix(in srgb,{hue} {share}%,transparent)\">{}</td>",
-                    // Nothing is no minus nothing.
+                    // Avoids a negative zero.
                     format!("{:.2}", if c.abs() < 0.005 { 0.0 } else { c }).replace('-', "−")
                 )
             });
@@ -69,7 +69,7 @@ pub(in crate::report) fn section(camera: &CameraEstimate) -> String {
         let many = if names.len() > FEW { " many" } else { "" };
         matrix = format!(
             "<figure><div class=\"wide-table\"><table class=\"matrix{many}\">{matrix}</table></div><figcaption>Correlations. \
-             Parameters that are strongly correlated are known only together.</figcaption></figure>"
+             Strongly correlated parameters are determined only in combination.</figcaption></figure>"
         );
     }
     let table = format!(

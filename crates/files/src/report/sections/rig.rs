@@ -25,8 +25,8 @@ pub(in crate::report) fn places(report: &Report) -> String {
     });
     format!(
         "<section><h2>Relative camera poses</h2><div class=\"wide-table\"><table class=\"plain\"><tr><th>camera</th>\
-         {POSE_HEADS}<th>rms, px</th><th>corners</th></tr>{}</table></div><p class=\"note\">Places of the optical \
-         centres, and angles of rotation, relative to camera {}, with the largest standard deviations along any \
+         {POSE_HEADS}<th>rms, px</th><th>corners</th></tr>{}</table></div><p class=\"note\">Positions of the optical \
+         centres and rotation angles relative to camera {}, with the largest standard deviation (1σ) of any \
          axis.</p></section>\n",
         rows.collect::<String>(),
         escaped(first)
@@ -45,8 +45,8 @@ pub(in crate::report) fn targets(report: &Report) -> String {
     });
     format!(
         "<section><h2>Relative target poses</h2><div class=\"wide-table\"><table class=\"plain\"><tr><th>target</th>{POSE_HEADS}\
-         </tr>{}</table></div><p class=\"note\">Where the frame of each target is, relative to that of target {}, with the \
-         largest standard deviations along any axis.</p></section>\n",
+         </tr>{}</table></div><p class=\"note\">Pose of the frame of each target relative to target {}, with the \
+         largest standard deviation (1σ) of any axis.</p></section>\n",
         rows.collect::<String>(),
         escaped(&targets[0].name)
     )
@@ -54,11 +54,10 @@ pub(in crate::report) fn targets(report: &Report) -> String {
 
 /// Heads of the columns of [`pose_cells`].
 const POSE_HEADS: &str =
-    "<th>x, mm</th><th>y, mm</th><th>z, mm</th><th>± mm</th><th>turned by, °</th><th>± °</th>";
+    "<th>x, mm</th><th>y, mm</th><th>z, mm</th><th>1σ, mm</th><th>rotation, °</th><th>1σ, °</th>";
 
-/// The cells of a pose: translation, mm, angle of rotation, degrees, and the largest deviation of
-/// each. `sd` are those of rotation, rad, and translation, mm; where they are not known, the pose is
-/// the one that others are relative to.
+/// The cells of a pose: translation, mm, rotation angle, degrees, and the largest standard deviation of each. `sd` contains
+/// those of the rotation, rad, and of the translation, mm; it is `None` for the reference pose.
 fn pose_cells(pose: &Pose, sd: Option<[f64; 6]>) -> String {
     let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
     // Adding zero makes a negative zero positive.
@@ -73,7 +72,7 @@ fn pose_cells(pose: &Pose, sd: Option<[f64; 6]>) -> String {
     cells.map(|cell| format!("<td class=\"number\">{cell}</td>")).concat()
 }
 
-/// Refined panel poses against those of the target file.
+/// Refined panel poses relative to those of the target file.
 pub(in crate::report) fn panels(report: &Report) -> String {
     let seen = report.estimate.corners().map(|corner| (corner.panel.index(), corner.panel.id()));
     let ids: BTreeMap<usize, u32> = seen.collect();
@@ -102,19 +101,19 @@ pub(in crate::report) fn panels(report: &Report) -> String {
     }
     format!(
         "<section><h2>Refined panels</h2><div class=\"wide-table\"><table class=\"plain\"><tr><th>panel</th>\
-         <th>moved by, mm</th><th>± mm</th><th>turned by, °</th><th>± °</th></tr>{rows}</table></div>\
-         <p class=\"note\">Origins of the panels against where the target's file has them, with standard \
-         deviations. A panel that is not listed stays in place, or was not seen.</p></section>\n"
+         <th>translation, mm</th><th>1σ, mm</th><th>rotation, °</th><th>1σ, °</th></tr>{rows}</table></div>\
+         <p class=\"note\">Displacement of each panel from its pose in the target file, with standard \
+         deviations (1σ). Panels that are not listed kept their pose or were not seen.</p></section>\n"
     )
 }
 
-/// Rotation, rad, and translation, mm, of a panel against its stated pose.
+/// Rotation, rad, and translation, mm, of a panel relative to its stated pose.
 fn off(found: &PanelPlace, stated: &PanelPlace) -> [DVec3; 2] {
     found.target_from_panel.off(&stated.target_from_panel)
 }
 
-/// Standard deviation of the length of a vector with a block of the covariance; for a zero vector
-/// the largest of any direction.
+/// Standard deviation of the length of a vector, from a block of the covariance; for a zero vector, the largest of any
+/// direction.
 fn deviation(of: DVec3, covariance: &[[f64; 6]; 6], block: usize) -> f64 {
     let entry = |i: usize, j: usize| covariance[block + i][block + j];
     let variance = match of.try_normalize() {
@@ -128,7 +127,7 @@ fn deviation(of: DVec3, covariance: &[[f64; 6]; 6], block: usize) -> f64 {
     variance.max(0.0).sqrt()
 }
 
-/// The moments, and what of each was seen.
+/// The frames, and the cameras and corners of each.
 pub(in crate::report) fn frames(report: &Report) -> String {
     let estimate = report.estimate;
     let mut order: Vec<usize> = (0..estimate.frames.len()).collect();
@@ -153,7 +152,7 @@ pub(in crate::report) fn frames(report: &Report) -> String {
     )
 }
 
-/// A frame in the table; `worst` is the largest rms in it, px.
+/// A row of the table; `worst` is the largest RMS in it, px.
 fn row(report: &Report, index: usize, frame: &FrameEstimate, worst: f64) -> String {
     let views = report.estimate.cameras.iter().flat_map(|camera| {
         let views = camera.views.iter().filter(|view| view.frame == index);

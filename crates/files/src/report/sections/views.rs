@@ -1,4 +1,4 @@
-//! The views of a camera: the worst as pictures, all of them in a table.
+//! The views of a camera: the worst as images, all of them in a table.
 
 use std::fmt::Write as _;
 
@@ -10,22 +10,22 @@ use deltille_calibrate::{CameraEstimate, Excluded, ViewEstimate};
 use deltille_core::statistics::quantile;
 use deltille_core::words::counted;
 
-/// Views in the table: all, or where there are more the worst ones.
+/// Maximum number of views in the table; with more views, the worst are listed.
 pub(super) const MOST_VIEWS: usize = 300;
 
-/// Views that are shown in pictures.
+/// Number of views shown as images.
 const IN_PICTURES: usize = 8;
 
-/// Nearly all arrows of residuals are at most as long as this part of the width of a picture.
+/// Length that nearly all residual arrows stay below, as a fraction of the image width.
 const ARROW_PART: f64 = 0.05;
 const NEARLY_ALL: f64 = 0.95;
 
-/// The views of a camera that a page shows, those with the largest RMS residual first.
+/// The views of a camera that the page shows, ordered by decreasing RMS residual.
 pub fn shown_views(camera: &CameraEstimate) -> Vec<&ViewEstimate> {
     order(camera).into_iter().map(|index| &camera.views[index]).collect()
 }
 
-/// Indices of the views that are shown, those with the largest RMS first.
+/// Indices of the views that are shown, ordered by decreasing RMS residual.
 fn order(camera: &CameraEstimate) -> Vec<usize> {
     let mut order: Vec<usize> = (0..camera.views.len()).collect();
     let rms = |index: usize| camera.views[index].rms_px;
@@ -34,8 +34,8 @@ fn order(camera: &CameraEstimate) -> Vec<usize> {
     order
 }
 
-/// The section about the views of a camera: the worst as pictures with enlarged residuals, and all,
-/// held-out views included, in a folded table.
+/// The section about the views of a camera: the worst as images with enlarged residuals, and all, including
+/// held-out views, in a folded table.
 pub(in crate::report) fn section(report: &Report, index: usize, survey: &Survey) -> String {
     let camera = &report.estimate.cameras[index];
     let (order, all) = (order(camera), camera.views.len());
@@ -82,12 +82,12 @@ pub(in crate::report) fn section(report: &Report, index: usize, survey: &Survey)
         false => format!("All {} in a table", counted(all + of_test.len(), "view")),
     };
     let bent = match report.has_panels() {
-        true => "panels are not flat or not in their places",
-        false => "the board is bent",
+        true => "panels are bent or displaced",
+        false => "a bent board",
     };
     let arrows = format!(
-        "<p class=\"note\">Arrows are residuals, {enlarged} times enlarged; outliers are red. All one way: the picture moved, or \
-         its {}; outwards or in turns: the lens, or {bent}.</p>",
+        "<p class=\"note\">Arrows are residuals, enlarged {enlarged} times; outliers are red. Arrows in one direction indicate \
+         motion of the camera or of the {}. Radial or alternating arrows indicate the lens model or {bent}.</p>",
         report.target_noun()
     );
     let body = format!(
@@ -95,11 +95,10 @@ pub(in crate::report) fn section(report: &Report, index: usize, survey: &Survey)
          <table class=\"plain views\"><tr><th></th><th>view</th><th>corners</th><th>rms, px</th><th>outliers</th>\
          <th>tilt</th><th>distance, mm</th></tr>{rows}</table></div></details>"
     );
-    html::section("Views, the worst first", &body)
+    html::section("Views, worst first", &body)
 }
 
-/// The factor by which the residuals of these views are enlarged in their pictures, the same for
-/// all of them: a round number.
+/// The common magnification of the residuals in the images of these views, a round number.
 fn enlarged(camera: &CameraEstimate, views: &[usize]) -> f64 {
     let corners = views.iter().flat_map(|&index| &camera.views[index].corners);
     let corners = corners.filter(|corner| !corner.outlier);
@@ -108,7 +107,7 @@ fn enlarged(camera: &CameraEstimate, views: &[usize]) -> f64 {
     round_down(ARROW_PART * f64::from(camera.camera.width) / longest).max(1.0)
 }
 
-/// The picture of a view with its key figures; `worst` is the largest RMS of any view, px.
+/// The image of a view with its key figures; `worst` is the largest RMS of any view, px.
 fn card(
     report: &Report,
     camera: usize,
@@ -135,7 +134,7 @@ fn card(
     )
 }
 
-/// A view in the table; `worst` is the largest RMS of any view, px, and `note` follows its name.
+/// A row of the table; `worst` is the largest RMS of any view, px, and `note` follows the name.
 fn row(
     report: &Report,
     camera: usize,
@@ -162,23 +161,23 @@ fn row(
     )
 }
 
-/// Where the picture of a view is shown. A photograph that is shown twice is embedded once.
+/// Where the image of a view is shown. An image that is shown twice is embedded once.
 enum Shown {
     /// In the table alone.
     Only,
-    /// In a card, with an id for its photograph, and residuals enlarged by a factor.
+    /// In a card, with an id for its image, and residuals enlarged by a factor.
     First { id: String, enlarged: f64 },
-    /// In the table, with the photograph of the card that has this id.
+    /// In the table, reusing the image of the card with this id.
     Again(String),
 }
 
-/// Id of the photograph in the card of a view, by the indices of camera and view.
+/// Id of the image in the card of a view, by the indices of camera and view.
 fn id(camera: usize, of_view: usize) -> String {
     format!("picture-{camera}-{of_view}")
 }
 
-/// The thumbnail of a view with its corners, and their residuals enlarged by a factor; these alone
-/// where there is no thumbnail.
+/// The thumbnail of a view with its corners and their enlarged residuals; only corners and residuals if there is no
+/// thumbnail.
 fn picture(report: &Report, index: usize, view: &ViewEstimate, shown: Shown) -> String {
     let camera = &report.estimate.cameras[index].camera;
     let (width, height) = (camera.width, camera.height);
