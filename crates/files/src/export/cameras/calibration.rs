@@ -67,8 +67,7 @@ struct HeldOut<'a> {
     excluded: &'a [Excluded],
 }
 
-/// The JSON text of the calibration of a single camera, with the diagnoses that were made; `None`
-/// for an estimate without cameras.
+/// The JSON text of the calibration of a single camera with its diagnoses; `None` for an estimate without cameras.
 pub fn write(
     found: &Estimate,
     said: &[Diagnosis],

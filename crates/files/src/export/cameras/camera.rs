@@ -2,8 +2,8 @@
 //! nerfstudio.
 //!
 //! Image coordinates are converted to the convention of each program: COLMAP and nerfstudio put the
-//! centre of the first pixel at (½, ½), not at (0, 0). A lens model that the format lacks is
-//! refused, not approximated.
+//! centre of the first pixel at (½, ½), not at (0, 0). A lens model that the format does not support is
+//! an error; it is not approximated.
 
 use std::fmt::Write as _;
 
@@ -15,9 +15,9 @@ use deltille_calibrate::Model;
 use deltille_core::camera::{Camera, Lens, Pose, SplineGrid};
 use deltille_core::name;
 
-/// A format that has no model for a lens.
+/// Error of a format that does not support a lens model.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{format} cannot carry {lens}; its models: {models}")]
+#[error("{format} does not support {lens}; supported models: {models}")]
 pub struct FormatError {
     /// The format.
     format: &'static str,
@@ -27,10 +27,10 @@ pub struct FormatError {
     models: String,
 }
 
-/// A model of a program: the largest of ours that it holds, how many coefficients it has, and what it is called there.
+/// A model of another program: our largest model that it represents, its number of coefficients, and its name there.
 type Theirs = (Model, usize, &'static str);
 
-/// As many coefficients as the lens has.
+/// All coefficients of the lens.
 const ALL: usize = usize::MAX;
 
 /// The models of a program, those with fewer coefficients first.
@@ -61,7 +61,7 @@ pub(super) const ROS: Models = Models {
     ],
 };
 
-/// The camera and its distortion; where there is none, what is found of the lens comes before its focal lengths.
+/// Names of the camera and its distortion. Without distortion, the lens parameters precede the focal lengths.
 pub(super) const KALIBR: Models = Models {
     format: "kalibr",
     models: &[
@@ -103,12 +103,12 @@ pub(super) const MRCAL: Models = Models {
 };
 
 impl Models {
-    /// What ours are called that it carries.
+    /// Our names of the supported models.
     pub(super) fn names(&self) -> Vec<String> {
         self.models.iter().map(|(model, ..)| model.to_string()).collect()
     }
 
-    /// What the lens of a camera is called, and its coefficients.
+    /// The name of the lens of a camera in this format, and its coefficients.
     fn of(&self, camera: &Camera) -> Result<(&'static str, Vec<f64>), FormatError> {
         let mut values = camera.lens.parameters();
         let needed = values.iter().rposition(|&k| k != 0.0).map_or(0, |last| last + 1);
@@ -140,7 +140,7 @@ impl Models {
 /// ```
 ///
 /// # Errors
-/// When OpenCV has no such lens model.
+/// Returns an error if OpenCV does not support the lens model.
 pub fn opencv(camera: &Camera) -> Result<String, FormatError> {
     let Coefficients { is_fisheye, values } = opencv_coefficients(camera)?;
     let model = if is_fisheye { "distortion_model: fisheye\n" } else { "" };
@@ -154,19 +154,19 @@ pub fn opencv(camera: &Camera) -> Result<String, FormatError> {
     ))
 }
 
-/// The coefficients of distortion by which OpenCV knows a lens.
+/// The distortion coefficients of a lens in OpenCV.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coefficients {
-    /// Whether they are those of the module `fisheye`: k1 k2 k3 k4.
+    /// Whether they belong to the module `fisheye`: k1 k2 k3 k4.
     pub is_fisheye: bool,
-    /// 4, 5, 8 or 12 of k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4, as many as are needed, or those of a fisheye.
+    /// The first 4, 5, 8 or 12 of k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4, as few as possible, or those of a fisheye.
     pub values: Vec<f64>,
 }
 
 /// The coefficients of a camera for OpenCV.
 ///
 /// # Errors
-/// When OpenCV has no such lens model.
+/// Returns an error if OpenCV does not support the lens model.
 pub fn opencv_coefficients(camera: &Camera) -> Result<Coefficients, FormatError> {
     let (name, values) = OPENCV.of(camera)?;
     Ok(Coefficients { is_fisheye: !name.is_empty(), values })
@@ -182,7 +182,7 @@ fn opencv_matrix(rows: usize, cols: usize, data: &[f64]) -> String {
 /// The camera file of ROS (`camera_info` as YAML), with the camera name.
 ///
 /// # Errors
-/// When ROS has no such lens model.
+/// Returns an error if ROS does not support the lens model.
 pub fn ros(camera: &Camera, name: &str) -> Result<String, FormatError> {
     let (model, coefficients) = ROS.of(camera)?;
     let [fx, _, cx, _, fy, cy, ..] = matrix(camera);
@@ -205,11 +205,11 @@ pub fn ros(camera: &Camera, name: &str) -> Result<String, FormatError> {
 }
 
 /// The camera chain of Kalibr: cameras, each with its camera_from_rig (mm, written in metres).
-/// `overlaps` lists for each camera the indices of those whose view overlaps its own, and may be
-/// shorter. Topics are `/cam0/image_raw` and so on.
+/// `overlaps` lists, for each camera, the indices of the cameras whose field of view overlaps its own;
+/// it may be shorter. Topics are `/cam0/image_raw` and so on.
 ///
 /// # Errors
-/// When Kalibr has no such lens model.
+/// Returns an error if Kalibr does not support the lens model.
 pub fn kalibr(cameras: &[(&Camera, Pose)], overlaps: &[Vec<usize>]) -> Result<String, FormatError> {
     let mut text = format!("# {GENERATOR}\n");
     for (n, (camera, camera_from_rig)) in cameras.iter().enumerate() {
@@ -221,7 +221,7 @@ pub fn kalibr(cameras: &[(&Camera, Pose)], overlaps: &[Vec<usize>]) -> Result<St
             let motion = camera_from_rig.after(&before_from_rig.inverse());
             text += "  T_cn_cnm1:\n";
             let rotation = DMat3::from_quat(motion.rotation);
-            // Kalibr's lengths are metres.
+            // Kalibr uses metres.
             let shift = motion.translation / 1000.0;
             for i in 0..3 {
                 let row = rotation.row(i).to_array();
@@ -253,7 +253,7 @@ fn kalibr_camera(camera: &Camera) -> Result<String, FormatError> {
 /// stores spline lenses.
 ///
 /// # Errors
-/// When mrcal has no such lens model.
+/// Returns an error if mrcal does not support the lens model.
 pub fn mrcal(camera: &Camera) -> Result<String, FormatError> {
     let (model, coefficients) = MRCAL.of(camera)?;
     let grid = match &camera.lens {
@@ -277,7 +277,7 @@ pub fn mrcal(camera: &Camera) -> Result<String, FormatError> {
 /// The `cameras.txt` of COLMAP, with cameras numbered from 1.
 ///
 /// # Errors
-/// When COLMAP has no such lens model.
+/// Returns an error if COLMAP does not support the lens model.
 pub fn colmap(cameras: &[&Camera]) -> Result<String, FormatError> {
     let mut text = format!("# {GENERATOR}\n# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n");
     for (n, camera) in (1..).zip(cameras) {
@@ -291,11 +291,11 @@ pub fn colmap(cameras: &[&Camera]) -> Result<String, FormatError> {
     Ok(text)
 }
 
-/// The `rig_config.json` of COLMAP: cameras by name, each with its camera_from_rig; images lie in a
-/// folder of the name of their camera. The first camera is the reference sensor of the rig.
+/// The `rig_config.json` of COLMAP: cameras by name, each with its camera_from_rig. The images of a camera are in a folder with
+/// its name. The first camera is the reference sensor of the rig.
 ///
 /// # Errors
-/// When COLMAP has no such lens model.
+/// Returns an error if COLMAP does not support the lens model.
 pub fn colmap_rig(cameras: &[(&str, &Camera, Pose)]) -> Result<String, FormatError> {
     let mut entries = Vec::with_capacity(cameras.len());
     for (n, (name, camera, camera_from_rig)) in cameras.iter().enumerate() {
@@ -326,10 +326,10 @@ fn colmap_camera(camera: &Camera) -> Result<(&'static str, Vec<f64>), FormatErro
 
 /// The `transforms.json` of nerfstudio: the camera, and for each image the inverse of its
 /// camera_from_target, with lengths in mm and camera axes as in OpenGL (y up, z backwards). An
-/// image path that leads out of its folder is shortened to its end.
+/// image path that leads out of its folder is shortened to its last part.
 ///
 /// # Errors
-/// When nerfstudio has no such lens model.
+/// Returns an error if nerfstudio does not support the lens model.
 pub fn nerfstudio(camera: &Camera, views: &[(&str, Pose)]) -> Result<String, FormatError> {
     let (model, coefficients) = NERFSTUDIO.of(camera)?;
     let frames = views.iter().map(|(image, camera_from_target)| {
@@ -360,11 +360,11 @@ fn matrix(camera: &Camera) -> [f64; 9] {
     [focal.x, 0.0, centre.x, 0.0, focal.y, centre.y, 0.0, 0.0, 1.0]
 }
 
-/// Numbers as every reader of YAML takes them for floating-point ones: `600.0`, `1e-05`.
+/// Numbers in a form that every YAML reader recognises as floating-point: `600.0`, `1.0e-5`.
 fn list(values: &[f64]) -> String {
     let words = values.iter().map(|value| match format!("{value:?}") {
         word if word.contains('.') => word,
-        // YAML 1.1 wants a point in the mantissa.
+        // YAML 1.1 requires a decimal point in the mantissa.
         word => word.replacen('e', ".0e", 1),
     });
     words.collect::<Vec<_>>().join(", ")
@@ -384,7 +384,7 @@ mod tests {
     }
 
     #[test]
-    fn what_ros_and_opencv_read_is_the_camera() {
+    fn ros_and_opencv_files_read_back_as_the_camera() {
         for (model, count) in [
             (Model::Radtan, 4),
             (Model::Radtan5, 5),
@@ -402,7 +402,7 @@ mod tests {
     }
 
     #[test]
-    fn a_format_that_cannot_carry_a_model_says_so() {
+    fn formats_refuse_models_they_do_not_support() {
         for (model, count, carried) in [
             (Model::Radtan, 4, [true, true, true, true, true]),
             (Model::Radtan5, 5, [true, true, false, true, true]),
@@ -427,11 +427,11 @@ mod tests {
         }
         let said =
             kalibr(&[(&camera(Model::Radtan5, 5), Pose::IDENTITY)], &[]).unwrap_err().to_string();
-        assert!(said.starts_with("kalibr cannot carry a perspective lens with k1 k2 p1 p2 k3"));
+        assert!(said.starts_with("kalibr does not support a perspective lens with k1 k2 p1 p2 k3"));
     }
 
     #[test]
-    fn a_rig_says_where_its_cameras_are() {
+    fn rig_files_contain_the_camera_poses() {
         let radtan = camera(Model::Radtan, 4);
         let turn = glam::DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2);
         let beside = Pose { rotation: turn, translation: glam::DVec3::new(-120.0, 0.0, 0.0) };
@@ -451,7 +451,7 @@ mod tests {
     }
 
     #[test]
-    fn texts_are_those_that_the_programs_document() {
+    fn texts_follow_the_documentation_of_the_programs() {
         let radtan = camera(Model::Radtan, 4);
         assert_eq!(
             kalibr(&[(&radtan, Pose::IDENTITY)], &[]).unwrap(),

@@ -33,8 +33,8 @@ struct CameraRecord<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     undecided: Option<&'static str>,
     second_from_first: Motion,
-    /// For each pixel (x, y) of the first camera the difference (dx, dy) of the second camera
-    /// there, and the standard deviation of a coordinate.
+    /// For each pixel (x, y) of the first camera, the difference (dx, dy) of the second camera and
+    /// the standard deviation per axis.
     places: Vec<PlaceRecord>,
 }
 
@@ -62,8 +62,8 @@ struct MotionRecord<'a> {
     undecided: Option<&'static str>,
 }
 
-/// The JSON text of a comparison; `names` are those of the cameras, empty for a camera without
-/// name, in the order of `found`. Lengths in mm, angles in rad, image distances in px.
+/// The JSON text of a comparison. `names` are those of the cameras in the order of `found`, empty for a
+/// camera without a name. Lengths are in mm, angles in rad, image distances in px.
 pub fn write(names: &[&str], found: &[Comparison], motions: &[CameraMotion]) -> String {
     let cameras = names.iter().zip(found).map(|(name, found)| CameraRecord {
         name,

@@ -1,4 +1,4 @@
-//! Records that the files of single cameras and of rigs share.
+//! Records shared by the files of single cameras and of rigs.
 
 use std::collections::BTreeMap;
 
@@ -14,19 +14,19 @@ use deltille_calibrate::{
 use deltille_core::camera::{Lens, SplineGrid};
 use deltille_core::detection::InkEstimate;
 
-/// What is known of the print that was photographed, besides its plan.
+/// Measurements of the print that was photographed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Print {
-    /// Print scale, measured over stated length, across and up the sheet; `None` where it was not measured.
+    /// Print scale (measured length / stated length) across and up the sheet; `None` if it was not measured.
     pub scale: Option<[f64; 2]>,
-    /// Ink spread estimated from the detections; `None` where it was not estimated.
+    /// Ink spread estimated from the detections; `None` if it was not estimated.
     pub ink: Option<InkEstimate>,
 }
 
-/// Whether a file lists the residual of every corner, which makes up nearly all of its length.
+/// Whether a file lists the residual of every corner, which accounts for nearly all of its size.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Residuals {
-    /// Views state their number of corners and the RMS residual only.
+    /// Views contain only their number of corners and the RMS residual.
     #[default]
     LeftOut,
     /// Views list all corners.
@@ -53,15 +53,15 @@ pub(in crate::export) struct ParameterRecord<'a> {
 /// Uncertainty of the projections of a camera.
 #[derive(Serialize)]
 pub(in crate::export) struct ProjectionRecord {
-    /// For a rotation (rad) and a translation (mm) along each axis, its derivative by each
-    /// estimated parameter.
+    /// For a rotation (rad) and a translation (mm) along each axis, the derivative with respect to
+    /// each estimated parameter.
     alignment: Vec<Vec<f64>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     observed_correlations: Option<Vec<Vec<f64>>>,
     /// Degrees of freedom of the observed covariance.
     #[serde(skip_serializing_if = "Option::is_none")]
     observed_freedom: Option<f64>,
-    /// The part of the observed covariance that errors of the board make, the lower triangle.
+    /// The contribution of board errors to the observed covariance, lower triangle.
     #[serde(skip_serializing_if = "Option::is_none")]
     board_covariance: Option<Vec<Vec<f64>>>,
     distances_mm: Vec<f64>,
@@ -81,7 +81,7 @@ struct UncertaintyRecord {
 #[derive(Serialize)]
 pub(in crate::export) struct ViewRecord<'a> {
     name: &'a str,
-    /// The frame of the view, where its name differs.
+    /// The frame of the view, if its name differs.
     #[serde(skip_serializing_if = "Option::is_none")]
     frame: Option<&'a str>,
     image: &'a str,
@@ -89,7 +89,7 @@ pub(in crate::export) struct ViewRecord<'a> {
     outliers: usize,
     corner_count: usize,
     camera_from_target: Motion,
-    /// Row, column, x, y, dx, dy of each corner, by panel, where they are listed.
+    /// Row, column, x, y, dx, dy of each corner, by panel, if they are listed.
     #[serde(skip_serializing_if = "Option::is_none")]
     corners: Option<Vec<CornerRecord<'a>>>,
 }
@@ -104,7 +104,7 @@ pub(in crate::export) struct CoverageRecord {
 
 #[derive(Serialize)]
 struct CornerRecord<'a> {
-    /// Name of the target, where there are several.
+    /// Name of the target, if there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
     target: Option<&'a str>,
     panel: PanelRef,
@@ -131,7 +131,7 @@ pub(in crate::export) struct ShapeRecord {
     significant: bool,
 }
 
-/// A diagnosis of an estimate that is not a finding, with the figures behind its text.
+/// A diagnosis of an estimate that is not a finding, with the figures used in its text.
 #[derive(Debug, Default, Serialize)]
 pub(in crate::export) struct DiagnosisRecord<'a> {
     kind: &'static str,
@@ -150,23 +150,23 @@ pub(in crate::export) struct DiagnosisRecord<'a> {
     left_out: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     all: Option<usize>,
-    /// The least rotation after which the board looks the same, degrees, and whether only the labels taken fit.
+    /// The smallest rotation after which the board looks the same, degrees, and whether only the selected labels fit.
     #[serde(skip_serializing_if = "Option::is_none")]
     degrees: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     sure: Option<bool>,
-    /// Parameters of another camera that explains the views.
+    /// Parameters of another camera that also explains the views.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     other: BTreeMap<String, f64>,
     /// Radius up to which the lens model is usable, px.
     #[serde(skip_serializing_if = "Option::is_none")]
     steady_px: Option<f64>,
-    /// The quantity that was estimated instead of taken for given, and the RMS residual then.
+    /// The quantity that was estimated instead of fixed, and the resulting RMS residual.
     #[serde(skip_serializing_if = "Option::is_none")]
     instead: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     rms_px_then: Option<f64>,
-    /// First view after a change of the camera, the intrinsic that changed before and after, and the deviation of the
+    /// First view after a change of the camera, the changed intrinsic before and after, and the standard deviation of the
     /// difference, px.
     #[serde(skip_serializing_if = "Option::is_none")]
     from_view: Option<&'a str>,
@@ -183,12 +183,12 @@ pub(in crate::export) struct DiagnosisRecord<'a> {
     shear_px: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     views: Option<usize>,
-    /// Length of the board along x over that along y, as described 1, and its deviation.
+    /// Ratio of the board's length along x to its length along y (1 as described), and its standard deviation.
     #[serde(skip_serializing_if = "Option::is_none")]
     ratio: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     ratio_sd: Option<f64>,
-    /// Probability of as much by noise alone.
+    /// Probability that noise alone has at least this effect.
     #[serde(skip_serializing_if = "Option::is_none")]
     significance: Option<f64>,
     #[serde(skip_serializing_if = "<[String]>::is_empty")]
@@ -247,8 +247,8 @@ pub(in crate::export) fn projection(camera: &CameraEstimate) -> Option<Projectio
     })
 }
 
-/// With many parameters only the lower triangle is written, to nine digits: the file of a fisheye
-/// would have 30 MB otherwise.
+/// Correlations of a covariance. With many parameters, only the lower triangle is written, to nine
+/// digits: the file of a fisheye spline would otherwise have 30 MB.
 fn correlations_of(covariance: &Matrix, are_many: bool) -> Vec<Vec<f64>> {
     let c = covariance;
     let of = |i: usize, j: usize| c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt();
@@ -360,12 +360,11 @@ pub(in crate::export) fn map<'a>(estimate: &'a Estimate, found: &'a TargetMap) -
     }
 }
 
-/// Kinds of diagnoses in files after which a calibration is not to be used as it is.
+/// Kinds of diagnoses in files that make a calibration unusable.
 const FAILURES: [&str; 5] =
     ["foreign_camera", "absurd_fit", "many_left_out", "many_panels_left_out", "changed_camera"];
 
-/// Whether a diagnosis of this kind in a file says that the calibration is not to be used as it is,
-/// as [`Diagnosis::is_failure`] does.
+/// Whether a diagnosis of this kind in a file makes the calibration unusable, as [`Diagnosis::is_failure`] does.
 pub fn is_failure(kind: &str) -> bool {
     FAILURES.contains(&kind)
 }
@@ -518,7 +517,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn failures_in_files_are_those_of_the_library() {
+    fn failure_kinds_in_files_match_the_library() {
         let mut estimate = Estimate::default();
         estimate.cameras = vec![CameraEstimate::given("camera", test_camera())];
         let all = [

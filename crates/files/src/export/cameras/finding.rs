@@ -1,10 +1,10 @@
-//! Findings of a calibration (what outliers have in common) as JSON records.
+//! Findings of a calibration (common properties of outliers) as JSON records.
 
 use serde::Serialize;
 
 use deltille_calibrate::{Diagnosis, Estimate, Finding, PanelRef, Shared, Words};
 
-/// A finding as files store it; `panel` is an id, `camera` a name.
+/// A finding in the form of the files; `panel` is an id, `camera` a name.
 #[derive(Debug, Default, Serialize)]
 pub(in crate::export) struct FindingRecord {
     kind: &'static str,
@@ -26,7 +26,7 @@ pub(in crate::export) struct FindingRecord {
     moved_mm: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     turned_rad: Option<f64>,
-    /// The sentence that says it.
+    /// The finding as a sentence.
     text: String,
 }
 

@@ -1,4 +1,4 @@
-//! The formats of cameras and of rigs: each is a line of a table, and a writer in [`super::camera`].
+//! The formats of cameras and of rigs: each has a line in a table and a writer in [`super::camera`].
 
 use super::camera::{
     COLMAP, FormatError, KALIBR, MRCAL, Models, NERFSTUDIO, OPENCV, ROS, colmap, colmap_rig,
@@ -10,20 +10,20 @@ use deltille_core::camera::{Camera, CameraFile, Pose};
 /// A format of cameras.
 #[derive(Clone, Copy)]
 pub struct CameraFormat {
-    /// What it can carry; nothing is said of the project's own, which carries every model.
+    /// The models that it supports; `None` for the project's own format, which supports every model.
     models: Option<&'static Models>,
-    /// What the name of a file has after that of the camera.
+    /// The end of the file name, after the name of the camera.
     pub end: &'static str,
     text: fn(&Written) -> Result<String, FormatError>,
 }
 
-/// What is written of a camera.
+/// The data to write for a camera.
 pub struct Written<'a> {
     /// The camera.
     pub file: &'a CameraFile,
     /// Its name.
     pub name: &'a str,
-    /// Its pictures, with the camera_from_target of each.
+    /// Its images, with the camera_from_target of each.
     pub views: &'a [(&'a str, Pose)],
 }
 
@@ -51,20 +51,20 @@ pub const CAMERA_FORMATS: &[CameraFormat] = &[
 ];
 
 impl CameraFormat {
-    /// Whether it is the project's own, which every command reads.
+    /// Whether it is the project's own format, which every command reads.
     pub fn is_own(&self) -> bool {
         self.models.is_none()
     }
 
-    /// The models that it can carry, by name; nothing where that is all.
+    /// The names of the models that it supports; empty if it supports all.
     pub fn models(&self) -> Vec<String> {
         self.models.map(Models::names).unwrap_or_default()
     }
 
-    /// The text of a file.
+    /// Returns the text of a file.
     ///
     /// # Errors
-    /// When the format has no such lens model.
+    /// Returns an error if the format does not support the lens model.
     pub fn text(&self, written: &Written) -> Result<String, FormatError> {
         (self.text)(written)
     }
@@ -86,16 +86,16 @@ impl Format for CameraFormat {
 #[derive(Clone, Copy)]
 pub struct RigFormat {
     name: &'static str,
-    /// Its files.
+    /// The files of the format.
     pub files: &'static [RigFile],
 }
 
 /// A file of a rig.
 #[derive(Clone, Copy)]
 pub struct RigFile {
-    /// What it alone is asked for by.
+    /// The name that selects only this file.
     name: &'static str,
-    /// What it is called.
+    /// The file name.
     pub file: &'static str,
     text: fn(&[Placed], Overlaps) -> Result<String, FormatError>,
 }
@@ -103,7 +103,7 @@ pub struct RigFile {
 /// A camera with its name and its camera_from_rig.
 pub type Placed<'a> = (&'a str, &'a Camera, Pose);
 
-/// For each camera the indices of those whose view overlaps its own.
+/// For each camera, the indices of the cameras whose field of view overlaps its own.
 pub type Overlaps<'a> = &'a [Vec<usize>];
 
 /// The formats of rigs.
@@ -139,10 +139,10 @@ pub const RIG_FORMATS: &[RigFormat] = &[
 ];
 
 impl RigFile {
-    /// Its text.
+    /// Returns the text of the file.
     ///
     /// # Errors
-    /// When the format has no such lens model.
+    /// Returns an error if the format does not support the lens model.
     pub fn text(&self, cameras: &[Placed], overlaps: &[Vec<usize>]) -> Result<String, FormatError> {
         (self.text)(cameras, overlaps)
     }

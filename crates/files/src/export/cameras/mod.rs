@@ -1,8 +1,8 @@
-//! Calibrations, and what follows from them.
+//! Calibrations and their applications.
 //!
-//! [`calibration`] and [`rig`] write estimates by the records of `estimate`, `finding` and `motion`; [`saved`] reads them back,
-//! [`sheet`] what they say of the print. [`camera`] writes the formats of other programs, of which `format` has the table;
-//! [`comparison`], [`pose`], [`next_view`], [`undistortion`] and [`truth`] are results of other commands.
+//! [`calibration`] and [`rig`] write estimates with the records of `estimate`, `finding` and `motion`. [`saved`] reads them back;
+//! [`sheet`] reads only their data about the print. [`camera`] writes the formats of other programs, and `format` is the table of
+//! these formats. [`comparison`], [`pose`], [`next_view`], [`undistortion`] and [`truth`] are the results of other commands.
 
 pub mod calibration;
 pub mod camera;

@@ -1,11 +1,11 @@
-//! Poses as all JSON files of this crate store them.
+//! Poses in the form that all JSON files of this crate use.
 
 use glam::{DMat3, DVec3};
 use serde::Serialize;
 
 use deltille_core::camera::Pose;
 
-/// A pose with its standard deviations, as files store it.
+/// A pose with its standard deviations, in the form of the files.
 #[derive(Serialize)]
 pub(in crate::export) struct Motion {
     /// Row-major.

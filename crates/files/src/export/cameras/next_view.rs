@@ -1,4 +1,4 @@
-//! The view to take next, schema `deltille/next-view/1`, and as a picture: the outline in which to hold the board.
+//! The next view to take, as JSON (schema `deltille/next-view/1`) and as a drawing of the outline in which to hold the board.
 
 #[cfg(feature = "print")]
 use std::fmt::Write as _;
@@ -52,7 +52,7 @@ struct Corner {
     y: f64,
 }
 
-/// The text of the file: the view to take next after so many of a target, and whether these are enough.
+/// The text of the file: the next view to take after `views` views of a target, and whether these are enough.
 pub fn write(next: &NextView, target: &str, views: usize, enough: bool) -> String {
     let corners = next.corners.iter().map(|corner| Corner {
         panel: corner.panel.id(),
@@ -84,8 +84,8 @@ pub fn write(next: &NextView, target: &str, views: usize, enough: bool) -> Strin
     serde_json::to_string_pretty(&file).expect("plain data has a JSON form") + "\n"
 }
 
-/// The outline, an arrow towards the board's upper side and the corners as an SVG of the image's size, to be laid over a
-/// live picture; empty when views are enough.
+/// The outline, an arrow towards the board's upper side and the corners as an SVG of the image size, for overlay on a live
+/// image; empty if the views are enough.
 #[cfg(feature = "print")]
 pub fn svg(next: &NextView, enough: bool) -> String {
     let [r, g, b] = COLOUR;
@@ -132,11 +132,11 @@ pub fn svg(next: &NextView, enough: bool) -> String {
     text + "</svg>\n"
 }
 
-/// The same as a PNG, over the photograph that was taken last; on black without one, or where its size is another. When
-/// views are enough it is that photograph.
+/// Like [`svg`], but as a PNG over the last photograph. The background is black if there is none or if its size differs. If the
+/// views are enough, the PNG shows only the photograph.
 ///
 /// # Errors
-/// When the picture is too large to draw on, or cannot be encoded.
+/// Returns an error if the image is too large to draw on, or if it cannot be encoded.
 #[cfg(feature = "print")]
 pub fn png(next: &NextView, enough: bool, last: Option<&AnyGray>) -> Result<Vec<u8>, OverlayError> {
     let size = [next.camera.width, next.camera.height];
@@ -152,7 +152,7 @@ pub fn png(next: &NextView, enough: bool, last: Option<&AnyGray>) -> Result<Vec<
     overlay::outlined(last, size, (!enough).then_some(&drawn))
 }
 
-/// An arrow from the middle of the board towards its upper side, as one line, px.
+/// An arrow from the centre of the board towards its upper side, as one line, px.
 #[cfg(feature = "print")]
 fn arrow(next: &NextView) -> Option<[DVec2; 5]> {
     let [from, to] = next.upwards?;
@@ -161,7 +161,7 @@ fn arrow(next: &NextView) -> Option<[DVec2; 5]> {
     Some([from, to, left, to, right])
 }
 
-/// A line that is seen on a small picture of the image, px.
+/// Line width that remains visible if the image is displayed at a small size, px.
 #[cfg(feature = "print")]
 fn line_px(next: &NextView) -> f64 {
     f64::from(next.camera.width.max(next.camera.height)) / 400.0

@@ -36,14 +36,14 @@ fn is_one(count: &usize) -> bool {
     *count == 1
 }
 
-/// The line of a picture without a pose, with the reason; without line end.
+/// The line of an image without a pose, with the reason; without a line end.
 pub fn write_none(image: &str, target: &str, reason: &str) -> String {
     let line = NoPoseLine { schema: SCHEMA, image, target, camera_from_target: None, reason };
     serde_json::to_string(&line).expect("plain data has a JSON form")
 }
 
-/// The line of a view of a single camera, with the standard deviations of its pose, and in how many poses the target
-/// looks the same where it has no tags; without line end.
+/// The line of a view of a single camera, with the standard deviations of its pose. For a target without tags, it contains the
+/// number of poses in which the target looks the same. There is no line end.
 pub fn write_line(estimate: &Estimate, view: &ViewEstimate, target: &Target) -> String {
     let alike =
         Reference::Target(target).label_symmetries().iter().map(|maps| 1 + maps.len()).max();

@@ -1,5 +1,5 @@
-//! Rig calibrations as JSON, schema `deltille/rig/1`: every camera with its pose on the rig, every
-//! frame with that of the target.
+//! Rig calibrations as JSON, schema `deltille/rig/1`: every camera with its pose on the rig, and every frame with the pose of
+//! the target.
 
 use serde::Serialize;
 
@@ -77,7 +77,7 @@ struct Camera<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     projection: Option<ProjectionRecord>,
     camera_from_rig: Motion,
-    /// Delay of its pictures, in frames.
+    /// Delay of its images, in frames.
     #[serde(skip_serializing_if = "is_none")]
     delay_frames: i32,
     /// Empirical standard deviation from the scatter of frames: rotation (rad) and translation
@@ -110,8 +110,7 @@ struct Seen<'a> {
     views: Vec<ViewRecord<'a>>,
 }
 
-/// The JSON text of the calibration of a rig; `model` is the lens model of its cameras where none
-/// was stated for a camera.
+/// The JSON text of the calibration of a rig; `model` is the lens model of cameras without one of their own.
 pub fn write(
     found: &Estimate,
     said: &[Diagnosis],

@@ -1,4 +1,4 @@
-//! What a calibration file says of the printed sheet: its scale and its shape, for later calibrations.
+//! The printed sheet in a calibration file: its scale and its shape, for later calibrations.
 
 use glam::DVec3;
 use serde::Deserialize;
@@ -12,41 +12,41 @@ use deltille_core::setting::Setting::{CalibrationBoardShape, CalibrationWrite, R
 use deltille_core::targets::{TargetIdentity, check_result_of};
 use deltille_layout::SheetLayout;
 
-/// What is known of the printed sheet before a calibration.
+/// Measurements of the printed sheet that are known before a calibration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sheet {
-    /// Print scale, measured over stated length, across and up the sheet; `None` where it was not measured.
+    /// Print scale (measured length / stated length) across and up the sheet; `None` if it was not measured.
     pub print_scale: Option<[f64; 2]>,
-    /// Deviation of the sheet from its plan after that scale; `None` where no shape was estimated.
+    /// Deviation of the sheet from its plan after scaling; `None` if no shape was estimated.
     pub shape: Option<Shape>,
-    /// The sheets of the only target, which say how its panels are turned on paper; empty where they are not described.
+    /// The sheets of the only target, which contain the rotation of its panels on paper; empty if they are not described.
     pub sheets: Vec<SheetLayout>,
 }
 
-/// Why no sheet can be read from a file.
+/// Error of reading a sheet from a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SheetError {
     /// The file is not a calibration.
     #[error(
-        "not what {CalibrationWrite} or {RigWrite} made: make it by a calibration with {CalibrationBoardShape}"
+        "not a calibration written by {CalibrationWrite} or {RigWrite}: calibrate with {CalibrationBoardShape}"
     )]
     Foreign,
-    /// A field is missing, or has an invalid value.
+    /// A field is missing or has an invalid value.
     #[error(
-        "field `{field}`: {problem}; make it anew by a calibration with {CalibrationBoardShape}"
+        "field `{field}`: {problem}; calibrate again with {CalibrationBoardShape}"
     )]
     Field {
-        /// The field, such as `board_shape.reach_mm`.
+        /// The field, for example `board_shape.reach_mm`.
         field: String,
-        /// What is wrong.
+        /// The problem with the field.
         problem: String,
     },
     /// The calibration was made with another target.
     #[error("{0}")]
     OtherTarget(String),
     /// The calibration did not estimate a shape.
-    #[error("no `board_shape` in it: make it by a calibration with {CalibrationBoardShape}")]
+    #[error("no `board_shape` in this file: calibrate with {CalibrationBoardShape}")]
     Flat,
 }
 
@@ -77,11 +77,11 @@ impl StoredShape {
     }
 }
 
-/// Reads the sheet from a calibration or rig file that has a shape; `targets` are those whose sheet it should be, none if it may be
-/// that of any.
+/// Reads the sheet from a calibration or rig file with a shape. It must belong to `targets`, unless these are empty.
 ///
 /// # Errors
-/// When the file is not a calibration, a field is not valid, it was made with another target, or no shape was estimated.
+/// Returns an error if the file is not a calibration, a field is not valid, the calibration was made with another target, or
+/// no shape was estimated.
 pub fn read_sheet(text: &str, targets: &[TargetIdentity]) -> Result<Sheet, SheetError> {
     let schema = json::schema(text.as_bytes()).ok().flatten();
     if !schema.is_some_and(|schema| [calibration::SCHEMA, rig::SCHEMA].contains(&schema.as_str())) {

@@ -14,35 +14,35 @@ use deltille_layout::synth::{Light, TruthCorner};
 /// Schema and version that this crate writes.
 pub const SCHEMA: &str = "deltille/truth/1";
 
-/// What is known of a synthetic photograph.
+/// The ground truth of a synthetic photograph.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Truth {
-    /// File name of the picture; empty where it has none.
+    /// File name of the image; empty if it has none.
     pub image: String,
     /// Name of the target.
     pub target: String,
     /// Pose of the target in the camera frame, mm.
     pub camera_from_target: Pose,
-    /// Light and blur; grey values are not in the file.
+    /// Light and blur; the file does not contain grey values.
     pub light: Light,
     /// The corners in view.
     pub corners: Vec<TruthCorner>,
 }
 
-/// Why a ground truth cannot be read from a file.
+/// Error of reading a ground truth from a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TruthError {
-    /// The file is something else.
+    /// The file is not a ground truth.
     #[error("not the ground truth of a synthetic photograph")]
     Foreign,
-    /// A field is missing, or has an invalid value.
+    /// A field is missing or has an invalid value.
     #[error("field `{field}`: {problem}")]
     Field {
         /// The field.
         field: String,
-        /// What is wrong.
+        /// The problem with the field.
         problem: String,
     },
 }
@@ -60,7 +60,7 @@ struct TruthFile<'a> {
     corners: &'a [TruthCorner],
 }
 
-/// The text of the ground truth of the picture with the file name `image`, of the target named
+/// Returns the text of the ground truth of the image with the file name `image`, of the target named
 /// `target`: pose (mm), light and corner positions (px).
 pub fn write(
     image: &str,
@@ -102,7 +102,7 @@ struct SavedTruth {
 /// Reads what [`write()`] wrote.
 ///
 /// # Errors
-/// When the text is something else, or a field is not valid.
+/// Returns an error if the text is not a ground truth, or if a field is not valid.
 pub fn read(text: &str) -> Result<Truth, TruthError> {
     if json::schema(text.as_bytes()).ok().flatten().as_deref() != Some(SCHEMA) {
         return Err(TruthError::Foreign);
@@ -123,7 +123,7 @@ mod tests {
     use glam::{DQuat, DVec3};
 
     #[test]
-    fn what_is_written_is_read() {
+    fn written_truth_is_read_back() {
         let pose = Pose {
             rotation: DQuat::from_scaled_axis(DVec3::new(0.1, -0.2, 0.3)),
             translation: DVec3::new(1.0, 2.0, 500.0),

@@ -1,5 +1,5 @@
 //! Undistorted views and rectified pairs as JSON, schemas `deltille/undistortion/1` and
-//! `deltille/rectification/1`, and as OpenCV stores them.
+//! `deltille/rectification/1`, and in the form of OpenCV.
 
 use std::fmt::Write as _;
 
@@ -36,7 +36,7 @@ struct View {
     view_from_camera: [f64; 9],
     /// Fraction of its pixels that the camera sees.
     covered: f64,
-    /// x, y, width, height of the largest rectangle that the camera sees completely.
+    /// x, y, width and height of the largest rectangle that the camera sees completely.
     whole_px: [usize; 4],
 }
 
@@ -80,8 +80,7 @@ fn rows(made: &Undistortion) -> [f64; 9] {
     DMat3::from_quat(made.view_from_camera()).transpose().to_cols_array()
 }
 
-/// The JSON text of an undistorted view; `map` has the place in the photograph for each of its
-/// pixels.
+/// The JSON text of an undistorted view; `map` contains the position in the photograph of each pixel of the view.
 pub fn write(made: &Undistortion, map: &PixelMap) -> String {
     json::to_text(&ViewFile { schema: SCHEMA, view: View::of(made, map) }, 1)
 }
@@ -129,8 +128,8 @@ pub fn opencv_pair(made: &Rectification) -> String {
     text
 }
 
-/// The x and y maps for OpenCV `remap`, px, as `.npy` files of float32 (height × width); −1 where
-/// the camera sees nothing.
+/// The x and y maps for OpenCV `remap`, px, as `.npy` files of float32 (height × width); −1 for pixels outside the camera
+/// image.
 pub fn maps(map: &PixelMap) -> [Vec<u8>; 2] {
     let of = |index: usize| {
         let values = map.places().iter().map(move |place| match place[index].is_nan() {
