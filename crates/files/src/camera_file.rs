@@ -8,46 +8,46 @@ use deltille_core::json;
 use crate::export::staging;
 use crate::limits::{Limits, MAX_SETTINGS_BYTES, ReadError};
 
-/// Why a camera cannot be read.
+/// Error of reading a camera.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CameraReadError {
-    /// What an interrupted run has left cannot be put in order.
+    /// The leftovers of an interrupted run cannot be cleaned up.
     #[error(transparent)]
     Settle(std::io::Error),
     /// The file cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
     /// A file of another kind.
-    #[error("{}: this is a {schema} file, not a camera: give the .yaml that `deltille calibrate` wrote", path.display())]
+    #[error("{}: this is a {schema} file, not a camera: use the .yaml that `deltille calibrate` wrote", path.display())]
     Kind {
         /// The file.
         path: PathBuf,
         /// Its schema.
         schema: String,
     },
-    /// The file is no camera.
+    /// The file is not a valid camera.
     #[error("{}: {error}", path.display())]
     Yaml {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem.
         error: CameraFileError,
     },
 }
 
-/// Reads the camera of a camera file, see [`read_with_targets`].
+/// Reads the camera of a camera file; see [`read_with_targets`].
 ///
 /// # Errors
-/// The same.
+/// Returns an error in the same cases.
 pub fn read(path: &Path) -> Result<Camera, CameraReadError> {
     read_with_targets(path).map(|file| file.camera)
 }
 
-/// Reads a camera file: one of ours, of ROS or OpenCV. What killed runs have left in its folder is put in order before.
+/// Reads a camera file of this program, ROS or OpenCV. Leftovers of killed runs in its folder are cleaned up first.
 ///
 /// # Errors
-/// Where the file cannot be read, or holds no camera.
+/// Returns an error if the file cannot be read, or does not contain a camera.
 pub fn read_with_targets(path: &Path) -> Result<CameraFile, CameraReadError> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     staging::settle(folder.unwrap_or(Path::new("."))).map_err(CameraReadError::Settle)?;

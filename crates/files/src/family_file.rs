@@ -6,7 +6,7 @@ use deltille_core::family::{Family, FamilyError};
 
 use crate::limits::{self, MAX_FAMILY_BYTES, ReadError};
 
-/// Why a family cannot be read.
+/// Error of reading a family.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FamilyFileError {
@@ -17,7 +17,7 @@ pub enum FamilyFileError {
     #[error(transparent)]
     Read(ReadError),
     /// The file is not UTF-8 text.
-    #[error("{}: not a family file (it is not UTF-8 text); name a .json family file", path.display())]
+    #[error("{}: not a family file (not UTF-8 text); use a .json family file", path.display())]
     NotText {
         /// The file.
         path: PathBuf,
@@ -27,14 +27,13 @@ pub enum FamilyFileError {
     In {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         error: FamilyError,
     },
 }
 
 impl FamilyFileError {
-    /// Whether the file was read completely, but its claims (codes, distance, fingerprint) do not
-    /// hold.
+    /// Whether the file was read completely, but its claims (codes, distance, fingerprint) are false.
     pub fn is_broken_claim(&self) -> bool {
         matches!(self, Self::In { error, .. } if error.is_broken_claim())
     }
@@ -43,8 +42,8 @@ impl FamilyFileError {
 /// Returns a shipped family by its name, or reads a family file by its path.
 ///
 /// # Errors
-/// When no family of that name is shipped and no such file exists, or the file is not a valid
-/// family.
+/// Returns an error if no family of that name is shipped and no such file exists, or if the file is not a
+/// valid family.
 pub fn resolve(name_or_path: &str) -> Result<Family, FamilyFileError> {
     match Family::shipped(name_or_path) {
         Err(FamilyError::Unknown { name, shipped }) => {
@@ -61,7 +60,7 @@ pub fn resolve(name_or_path: &str) -> Result<Family, FamilyFileError> {
 /// Reads a family file.
 ///
 /// # Errors
-/// When the file cannot be read or is not a valid family.
+/// Returns an error if the file cannot be read or is not a valid family.
 pub fn read(path: &Path) -> Result<Family, FamilyFileError> {
     let json = match limits::read_short_text(path, MAX_FAMILY_BYTES) {
         Err(ReadError::NotText { path }) => return Err(FamilyFileError::NotText { path }),

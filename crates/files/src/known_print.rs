@@ -1,4 +1,4 @@
-//! What is known of the printed sheet beforehand, put on views before they are calibrated.
+//! Known properties of the printed sheet, applied to views before calibration.
 
 use deltille_calibrate::{PanelPlace, Reference, View};
 use deltille_core::setting::Setting::{CalibrationRefinePanels, PrintScale, SightingBend};
@@ -7,55 +7,55 @@ use deltille_layout::SheetLayout;
 
 use crate::export::sheet::Sheet;
 
-/// Why what is known of a sheet cannot be used.
+/// Error of applying the known properties of a sheet.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SheetUseError {
-    /// A print scale of several targets.
-    #[error("{PrintScale}: it is that of one target")]
+    /// A print scale with several targets.
+    #[error("{PrintScale}: the scale applies to one target only")]
     ScaleOfMany,
-    /// A shape of several targets.
-    #[error("{SightingBend}: it is that of one board")]
+    /// A shape with several targets.
+    #[error("{SightingBend}: the shape applies to one board only")]
     ShapeOfMany,
-    /// Boards that lie about, in a scene.
+    /// Independent boards in a scene.
     #[error(
-        "boards of one file that lie about have no place in a scene: make a file for each, and give all of them"
+        "independent boards of one file cannot be used in a scene: make one file per board and give all of them"
     )]
     Loose,
     /// Two scales of a solid's net.
     #[error(
-        "{PrintScale}: faces that are stretched in one direction do not close to the solid that was planned: give \
-         one number for both, or find their places by {CalibrationRefinePanels}"
+        "{PrintScale}: faces stretched in one direction do not form the planned solid: give \
+         one number for both directions, or estimate the panel poses with {CalibrationRefinePanels}"
     )]
     Skewed,
     /// A solid whose faces were printed one by one.
     #[error(
-        "{PrintScale}: faces that are printed one by one keep their places on the solid: those are found by \
+        "{PrintScale}: the print scale does not change the poses of faces printed one by one: estimate them with \
          {CalibrationRefinePanels}"
     )]
     OneByOne,
     /// A board with two sides.
     #[error(
-        "{PrintScale}: the sides of a board are printed one by one, and how they lie to each other is found by \
-         {CalibrationRefinePanels}: leave it out"
+        "{PrintScale}: omit it, because the sides of a board are printed one by one; estimate their relative pose with \
+         {CalibrationRefinePanels}"
     )]
     Sides,
     /// A scale of a target that was measured.
-    #[error("{PrintScale}: {0} says where its corners were measured, as they were printed")]
+    #[error("{PrintScale}: {0} already contains the measured corner positions of the print")]
     ScaleOfMeasured(String),
     /// A shape of a target that was measured.
-    #[error("{SightingBend}: {0} says where its corners were measured, as they were printed")]
+    #[error("{SightingBend}: {0} already contains the measured corner positions of the print")]
     ShapeOfMeasured(String),
-    /// A shape of a target of several panels.
-    #[error("{SightingBend}: it is that of one board, and the target has several panels")]
+    /// A shape with a target of several panels.
+    #[error("{SightingBend}: the shape applies to one board, but the target has several panels")]
     ShapeOfPanels,
 }
 
 impl Sheet {
-    /// Where the panels of what was photographed are, on a solid as large as its net was printed.
+    /// The poses of the panels of the target, on a solid scaled like its printed net.
     ///
     /// # Errors
-    /// Where what is known is not of this reference.
+    /// Returns an error if these properties do not apply to the reference.
     pub fn panels(&self, reference: &Reference) -> Result<Vec<PanelPlace>, SheetUseError> {
         let scale = match reference {
             Reference::Target(target) => self.solid_scale(target)?,
@@ -78,7 +78,7 @@ impl Sheet {
         Ok(panels)
     }
 
-    /// How much larger than planned a solid is whose net was printed like this; 1 for a board.
+    /// The scale of a solid whose net was printed at this scale; 1 for a board.
     fn solid_scale(&self, target: &Target) -> Result<f64, SheetUseError> {
         let Some([across, up]) = self.print_scale.filter(|_| is_solid(target)) else {
             return Ok(1.0);
@@ -99,10 +99,10 @@ impl Sheet {
         Ok(across)
     }
 
-    /// Moves the corners of all views to where this sheet has them.
+    /// Moves the corners of all views to their positions on this sheet.
     ///
     /// # Errors
-    /// Where what is known is not of this target.
+    /// Returns an error if these properties do not apply to the target.
     pub fn put_on(&self, target: Option<&Target>, views: &mut [View]) -> Result<(), SheetUseError> {
         if let Some(target) = target {
             self.solid_scale(target)?;
@@ -124,7 +124,7 @@ impl Sheet {
                 let angle_rad = angle_on_sheet(&self.sheets, sighting.panel.id());
                 sighting.stretch(scale, angle_rad);
             }
-            // The shape was found on corners that the scale had moved.
+            // The shape was estimated from corners after scaling.
             if let Some(shape) = &self.shape {
                 sighting.bend(shape);
             }
@@ -138,7 +138,7 @@ fn is_solid(target: &Target) -> bool {
     target.panels.len() > 1 && !target.is_loose()
 }
 
-/// How the panel of an id is turned on its sheet, rad; 0 where no sheet is described.
+/// Rotation of the panel with the given id on its sheet, rad; 0 if no sheet is described.
 fn angle_on_sheet(sheets: &[SheetLayout], id: u32) -> f64 {
     let mut placements = sheets.iter().flat_map(|sheet| &sheet.placements);
     placements.find(|placement| placement.panel == id).map_or(0.0, |placement| placement.angle_rad)

@@ -1,16 +1,16 @@
 //! Reading and writing the files of calibration targets: artwork, targets, photographs, detections
 //! and calibrations.
 //!
-//! | module | its one job |
+//! | module | purpose |
 //! |---|---|
 //! | [`clock`] | the monotonic clock of the machine |
 //! | [`limits`] | bounds on the size of files that are read; panics and endless work of third-party readers |
 //! | [`family_file`] | families by name or from their files |
-//! | [`target_file`] | targets from their files, with the families that they name |
+//! | [`target_file`] | targets from their files, with their families |
 //! | [`camera_file`] | cameras from their files |
 //! | [`photograph`] | photographs in common formats as grey images |
 //! | `remap` | photographs undistorted or rectified |
-//! | `known_print` | what is known of a print (scale, bend, where panels lie), applied to views |
+//! | `known_print` | known properties of a print (scale, bend, panel poses), applied to views |
 //! | [`logo`] | logos from SVG |
 //! | [`export`] | artwork, targets and results to files and back, one module for each format |
 //! | [`report`] | a calibration as an HTML page |

@@ -2,14 +2,14 @@
 //!
 //! Metadata does not change the pixels:
 //!
-//! - pixels stay in sensor orientation, whatever orientation EXIF states for viewers, as they do for COLMAP and for
-//!   OpenCV with `IMREAD_IGNORE_ORIENTATION`; the orientation is noted;
-//! - colour profiles and gamma chunks are not applied, since the detector estimates the tone curve;
-//! - a TIFF must have one page, not counting thumbnails (reduced images); of an animation the first picture is taken;
-//! - a JPEG that holds fewer pixels than its header states, or more, is damaged, and refused unless
-//!   damage is accepted; all other formats are read completely or not at all. Neither JPEG nor WebP
-//!   has checksums: changed bytes that decode to the stated number of pixels are not noticed, nor,
-//!   in a WebP, bytes that decode to more.
+//! - pixels stay in sensor orientation; the EXIF orientation is recorded but not applied, as in COLMAP and in
+//!   OpenCV with `IMREAD_IGNORE_ORIENTATION`;
+//! - colour profiles and gamma chunks are not applied, because the detector estimates the tone curve;
+//! - a TIFF must have one page, not counting thumbnails (reduced images); of an animation, the first frame is read;
+//! - a JPEG with fewer or more pixels than its header states is damaged, and refused unless damage is
+//!   accepted; all other formats are read completely or not at all. JPEG and WebP have no checksums:
+//!   changed bytes that decode to the stated number of pixels are not detected. In a WebP, bytes that
+//!   decode to more pixels are not detected either.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read, Seek};
@@ -30,13 +30,13 @@ use crate::limits::{self, Exceeded, Limits};
 use deltille_core::raster::{AnyGray, FileNotes, Gray};
 use deltille_core::setting::Setting::{LimitsMaxPixels, PhotographReadWithNotes};
 
-/// Most bytes of decompressed metadata in a PNG: profiles and texts.
+/// Maximum size of decompressed metadata in a PNG (profiles and texts), bytes.
 const MAX_BESIDE_BYTES: u64 = 32 << 20;
 
-/// Most pages of a TIFF that are counted.
+/// Number of pages of a TIFF at which counting stops.
 const MAX_PAGES: usize = 1000;
 
-/// Bytes from which the format is recognised.
+/// Number of first bytes from which the format is recognised.
 const HEAD_BYTES: u64 = 64;
 
 /// Message of the strict JPEG decoder about bytes that do not affect any pixel.
@@ -45,17 +45,17 @@ const PADDING: &str = "Extra bytes between headers";
 /// The marker that ends a JPEG.
 const END_OF_IMAGE: &[u8] = &[0xFF, 0xD9];
 
-/// Bytes of noise that replace the end of the data: more than any block of pixels has.
+/// Number of noise bytes that replace the end of the data: more than any block of pixels has.
 const NOISE_BYTES: u32 = 1000;
 
 /// Multipliers that generate noise, with different first bits.
 const NOISES: [u32; 3] = [0x9E37_79B9, 0x45EB_CA6B, 0xF1BB_CDCB];
 
-/// Replacing this many of the last bytes of a picture by noise must change its pixels. The last
-/// byte alone may hold a single bit of it, which noise may happen to match.
+/// Number of last bytes whose replacement by noise must change the pixels. The last byte alone may
+/// contain a single bit of the image, which noise may match.
 const SURPLUS_BYTES: usize = 3;
 
-/// A photograph with the metadata that matter.
+/// A photograph with the relevant metadata.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Photograph {
     /// The grey values, in sensor orientation.
@@ -64,7 +64,7 @@ pub struct Photograph {
     pub notes: FileNotes,
 }
 
-/// Why an image file cannot be read.
+/// Error of reading an image file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageError {
@@ -73,7 +73,7 @@ pub enum ImageError {
     Io {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
     /// The file is not an image in a format that can be decoded.
@@ -84,7 +84,7 @@ pub enum ImageError {
     Decode {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: image::ImageError,
     },
     /// The image exceeds a limit.
@@ -95,16 +95,16 @@ pub enum ImageError {
         /// The limit.
         exceeded: Exceeded,
     },
-    /// The JPEG does not hold exactly its stated pixels.
-    #[error("{}: a damaged JPEG ({problem}): take it anew, or accept it by {PhotographReadWithNotes}", path.display())]
+    /// The JPEG does not contain exactly its stated pixels.
+    #[error("{}: damaged JPEG ({problem}): replace it, or accept it with {PhotographReadWithNotes}", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
-    /// The TIFF holds several pages.
-    #[error("{}: {pages} pages in one TIFF: save each as a file of its own", path.display())]
+    /// The TIFF has several pages.
+    #[error("{}: TIFF with {pages} pages: save each page as a separate file", path.display())]
     Pages {
         /// The file.
         path: PathBuf,
@@ -114,13 +114,13 @@ pub enum ImageError {
     /// The image, or its file, takes more memory than the limits allow, although its number of
     /// pixels does not exceed them.
     #[error(
-        "{}: takes more than {bytes} bytes of memory; {LimitsMaxPixels} sets how many, 4 for each",
+        "{}: needs more than {bytes} bytes of memory; {LimitsMaxPixels} sets this limit (4 bytes per pixel)",
         path.display()
     )]
     Memory {
         /// The file.
         path: PathBuf,
-        /// The most bytes that it may take.
+        /// The maximum number of bytes.
         bytes: u64,
     },
     /// The decoder panicked.
@@ -133,7 +133,7 @@ pub enum ImageError {
     },
 }
 
-/// Grey values of `rgb`, as photographs of colour have them; `None` where there are not three bytes for each pixel.
+/// Converts `rgb` to grey values with the weights used for colour photographs; `None` if there are not three bytes per pixel.
 pub fn grey_of_colours(width: u32, height: u32, rgb: Vec<u8>) -> Option<Gray<u8>> {
     match from_dynamic(DynamicImage::ImageRgb8(RgbImage::from_raw(width, height, rgb)?)) {
         AnyGray::U8(grey) => Some(grey),
@@ -148,24 +148,24 @@ pub fn grey_of_colours(width: u32, height: u32, rgb: Vec<u8>) -> Option<Gray<u8>
 /// The format is recognised by the content, not by the name.
 ///
 /// # Errors
-/// When the file cannot be read, is not a picture, is damaged, or exceeds the default [`Limits`].
+/// Returns an error if the file cannot be read, is not an image, is damaged, or exceeds the default [`Limits`].
 pub fn read(path: impl AsRef<Path>) -> Result<AnyGray, ImageError> {
     read_within(path.as_ref(), &Limits::default())
 }
 
-/// Reads a photograph as [`read`] does, within other limits than the default.
+/// Reads a photograph like [`read`], with other limits than the default.
 ///
 /// # Errors
-/// When the file cannot be read, is not a picture, is damaged, or exceeds the limits.
+/// Returns an error if the file cannot be read, is not an image, is damaged, or exceeds the limits.
 pub fn read_within(path: &Path, limits: &Limits) -> Result<AnyGray, ImageError> {
     Ok(read_with_notes(path, limits, false)?.image)
 }
 
-/// Reads a photograph with its metadata. A damaged JPEG is refused unless `accept_damaged` is set; the pixels that
-/// are missing in it are grey then.
+/// Reads a photograph with its metadata. A damaged JPEG is refused unless `accept_damaged` is set; its missing pixels are then
+/// grey.
 ///
 /// # Errors
-/// When the file cannot be read, is not a picture, exceeds the limits, or is damaged and that is
+/// Returns an error if the file cannot be read, is not an image, exceeds the limits, or is damaged and damage is
 /// not accepted.
 pub fn read_with_notes(
     path: &Path,
@@ -176,10 +176,10 @@ pub fn read_with_notes(
     Ok(Photograph { image: from_dynamic(image), notes })
 }
 
-/// The same of the bytes of a file, as somebody else has read them; `name` is what errors call it.
+/// Like [`read_with_notes`], from the bytes of a file; errors use `name`.
 ///
 /// # Errors
-/// When the bytes are not a picture, exceed the limits, or are damaged and that is not accepted.
+/// Returns an error if the bytes are not an image, exceed the limits, or are damaged and damage is not accepted.
 pub fn read_bytes(
     name: &Path,
     bytes: Vec<u8>,
@@ -193,12 +193,12 @@ pub fn read_bytes(
 /// Reads a photograph with its colours, within limits, in sensor orientation.
 ///
 /// # Errors
-/// When the file cannot be read, is not a picture, is damaged, or exceeds the limits.
+/// Returns an error if the file cannot be read, is not an image, is damaged, or exceeds the limits.
 pub fn read_colours(path: &Path, limits: &Limits) -> Result<DynamicImage, ImageError> {
     Ok(decoded(path, None, limits, false)?.0)
 }
 
-/// Decodes a file, or the bytes of one that were read already.
+/// Decodes a file, or the bytes of a file that was read before.
 fn decoded(
     path: &Path,
     bytes: Option<Vec<u8>>,
@@ -229,8 +229,8 @@ fn decoded(
     .map_err(broken)?
 }
 
-/// The number of pixels that the header of an image states; `None` where it cannot be read, and for
-/// pipes, which reading would use up.
+/// Returns the number of pixels that the header of an image states; `None` if it cannot be read, and for
+/// pipes, which can be read only once.
 pub fn pixels(path: &Path, limits: &Limits) -> Option<u64> {
     limits::check_file(path).ok()?;
     let dimensions =
@@ -239,16 +239,16 @@ pub fn pixels(path: &Path, limits: &Limits) -> Option<u64> {
     Some(u64::from(width) * u64::from(height))
 }
 
-/// A source from which decoders read.
+/// An input of decoders.
 trait Source: BufRead + Seek {}
 
 impl<T: BufRead + Seek> Source for T {}
 
-/// An image file, opened.
+/// An open image file.
 struct ImageFile<'a> {
     path: &'a Path,
-    /// The whole file where it is read at once: a JPEG, as its decoders require, and what comes
-    /// through a pipe.
+    /// The whole content if it is read at once: for a JPEG, because its decoders require it, and for a
+    /// pipe.
     bytes: Option<Vec<u8>>,
     /// Size of the file, bytes.
     length: u64,
@@ -269,7 +269,7 @@ impl<'a> ImageFile<'a> {
         (&mut file).take(HEAD_BYTES).read_to_end(&mut bytes).map_err(io)?;
         let format = image::guess_format(&bytes).ok();
         let is_whole = format == Some(ImageFormat::Jpeg) || !metadata.is_file();
-        // A pipe that is not an image is not read on, as it may never end.
+        // A pipe without an image is not read further, because it may never end.
         if is_whole && format.is_some() {
             file.take(most).read_to_end(&mut bytes).map_err(io)?;
             if bytes.len() as u64 > most {
@@ -281,7 +281,7 @@ impl<'a> ImageFile<'a> {
         Ok(Self { path, bytes: is_whole.then_some(bytes), length, format })
     }
 
-    /// A file that was read already.
+    /// An image file from bytes that were read before.
     fn of_bytes(path: &'a Path, bytes: Vec<u8>, limits: &Limits) -> Result<Self, ImageError> {
         let (most, length) = (limits.picture_bytes(), bytes.len() as u64);
         if length > most {
@@ -300,7 +300,7 @@ impl<'a> ImageFile<'a> {
         })
     }
 
-    /// A decoder that has read the header, for a picture within the limits.
+    /// Returns a decoder that has read the header, if the image is within the limits.
     fn decoder(&self, limits: &Limits) -> Result<impl ImageDecoder, ImageError> {
         let path = || self.path.to_owned();
         let decode = |source| ImageError::Decode { path: path(), source };
@@ -325,25 +325,25 @@ impl<'a> ImageFile<'a> {
         Ok(decoder)
     }
 
-    /// Refuses a TIFF of several pages, as it is not known which is meant.
+    /// Refuses a TIFF with several pages, because it is not known which one is meant.
     fn check_pages(&self) -> Result<(), ImageError> {
         if self.format != Some(ImageFormat::Tiff) {
             return Ok(());
         }
         match pages(self.source()?) {
-            // The decoder reports what is wrong with it.
+            // The decoder reports the problem.
             Ok(0 | 1) | Err(_) => Ok(()),
             Ok(pages) => Err(ImageError::Pages { path: self.path.to_owned(), pages }),
         }
     }
 
-    /// The pixels of an undamaged JPEG, or what is wrong with it; `None` for other files, and for
-    /// colour spaces that need their profile.
+    /// Returns the pixels of an undamaged JPEG, or the problem; `None` for other files, and for colour
+    /// spaces that need their profile.
     fn jpeg(&self) -> Result<Option<DynamicImage>, String> {
         let (Some(ImageFormat::Jpeg), Some(bytes)) = (self.format, &self.bytes) else {
             return Ok(None);
         };
-        let problem = |error: DecodeErrors| told(&error.to_string());
+        let problem = |error: DecodeErrors| one_line(&error.to_string());
         let mut decoder = jpeg_decoder(bytes, true);
         let mut pixels = decoder.decode().map_err(problem);
         if pixels.as_ref().is_err_and(|problem| problem.contains(PADDING)) {
@@ -362,7 +362,7 @@ impl<'a> ImageFile<'a> {
     }
 }
 
-/// Refuses a WebP that is shorter than its head says.
+/// Refuses a WebP that is shorter than its header states.
 fn check_webp(
     path: &Path,
     format: Option<ImageFormat>,
@@ -370,7 +370,7 @@ fn check_webp(
     length: u64,
 ) -> Result<(), ImageError> {
     if format == Some(ImageFormat::WebP) && riff_bytes(head).is_none_or(|whole| length < whole) {
-        let source = DecodingError::new(ImageFormat::WebP.into(), "it is cut off");
+        let source = DecodingError::new(ImageFormat::WebP.into(), "the file is truncated");
         return Err(ImageError::Decode { path: path.to_owned(), source: Decoding(source) });
     }
     Ok(())
@@ -384,12 +384,12 @@ fn jpeg_decoder(bytes: &[u8], strict: bool) -> JpegDecoder<ZCursor<&[u8]>> {
     JpegDecoder::new_with_options(ZCursor::new(bytes), options)
 }
 
-/// Refuses a JPEG in which some pixels are missing, or that has data beyond its last pixel. The
-/// decoder reports neither, so it is run again on modified data: noise after the last byte must not
-/// change a pixel, and noise in place of the last bytes must.
+/// Refuses a JPEG with missing pixels, or with data beyond its last pixel. The decoder reports
+/// neither, so it is run again on modified data: noise after the last byte must not change a pixel,
+/// and noise in place of the last bytes must.
 fn check_scans(bytes: &[u8], pixels: &[u8]) -> Result<(), String> {
     let Scans { end, is_one_run } = Scans::of(bytes);
-    // Without 0xFF, with which markers begin; in a scan it is followed by 0.
+    // Without a trailing 0xFF: it begins markers, and within a scan it is followed by 0.
     let scans = trimmed(&bytes[..end.unwrap_or(bytes.len())], |byte| byte == 0xFF);
     let noises = NOISES.map(|factor: u32| -> Vec<u8> {
         (1..NOISE_BYTES).map(|i| (i.wrapping_mul(factor) >> 24) as u8 & 0xFE).collect()
@@ -399,18 +399,18 @@ fn check_scans(bytes: &[u8], pixels: &[u8]) -> Result<(), String> {
         found.is_ok_and(|found| found == pixels)
     };
     if !is_shown_by(scans, &noises[0], false) {
-        return Err("not all pixels are in it".to_owned());
+        return Err("pixels are missing".to_owned());
     }
     // Some cameras pad the last words.
     let used = trimmed(scans, |byte| matches!(byte, 0 | 0xFF));
     let used = &used[..used.len().saturating_sub(SURPLUS_BYTES)];
     if is_one_run && noises.iter().all(|noise| is_shown_by(used, noise, true)) {
-        return Err("its data go on after the last pixel".to_owned());
+        return Err("there are data after the last pixel".to_owned());
     }
     Ok(())
 }
 
-/// The bytes without the trailing ones that satisfy `of`.
+/// The bytes without trailing ones that satisfy `of`.
 fn trimmed(bytes: &[u8], of: impl Fn(u8) -> bool) -> &[u8] {
     let end = bytes.iter().rposition(|&byte| !of(byte)).map_or(0, |last| last + 1);
     &bytes[..end]
@@ -424,17 +424,16 @@ fn riff_bytes(head: &[u8]) -> Option<u64> {
 
 /// Position and kind of the entropy-coded data of a JPEG.
 struct Scans {
-    /// Offset of the marker that ends the picture, if there is one.
+    /// Offset of the marker that ends the image, if there is one.
     end: Option<usize>,
-    /// Whether the data are one run of codes, each beginning where the last ends: neither
-    /// progressive nor with restarts.
+    /// Whether the data are one contiguous run of codes, neither progressive nor with restarts.
     is_one_run: bool,
 }
 
 impl Scans {
     fn of(bytes: &[u8]) -> Self {
         let (mut at, mut is_one_run) = (2, true);
-        // In a scan 0xFF is followed by 0 or a restart.
+        // Within a scan, 0xFF is followed by 0 or a restart.
         let is_marker =
             |pair: &[u8]| pair[0] == 0xFF && !matches!(pair[1], 0 | 1 | 0xD0..=0xD8 | 0xFF);
         while let Some(next) = bytes.get(at..).and_then(|rest| rest.windows(2).position(is_marker))
@@ -453,7 +452,7 @@ impl Scans {
 }
 
 /// The message of the decoder in one line, without quotation marks.
-fn told(problem: &str) -> String {
+fn one_line(problem: &str) -> String {
     let words: Vec<&str> = problem.trim_matches('"').split_whitespace().collect();
     words.join(" ")
 }
@@ -501,9 +500,9 @@ fn from_dynamic(image: DynamicImage) -> AnyGray {
 mod tests {
     use super::*;
 
-    /// Frames of a video are grey as a photograph of the same colours is, to one of the 256 values.
+    /// Frames of a video have the same grey values as a photograph of the same colours, within one of 256 levels.
     #[test]
-    fn frames_are_as_grey_as_photographs() {
+    fn frames_and_photographs_have_equal_grey_values() {
         let random = |i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8;
         let colours: Vec<u8> = (0..30_000).map(random).collect();
         let frame = deltille_core::raster::grey_of_colours::<3>(100, 100, &colours).unwrap();
@@ -529,7 +528,7 @@ mod tests {
     }
 
     #[test]
-    fn other_files_are_named_in_the_error() {
+    fn errors_name_the_file() {
         let dir = tempfile::tempdir().unwrap();
         let text = dir.path().join("notes.png");
         std::fs::write(&text, "no image").unwrap();

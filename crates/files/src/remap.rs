@@ -1,27 +1,25 @@
-//! Resampling of pictures through a map of pixels, such as an undistortion, keeping colours and
-//! depth.
+//! Resampling of images through a map of pixels, for example an undistortion. Colours and depth are kept.
 //!
-//! Interpolation is bicubic (Keys 1981). Where the map reduces the picture, several samples are
-//! averaged against aliasing, up to a reduction of eight along each axis.
+//! Interpolation is bicubic (Keys 1981). Where the map reduces the image, several samples are averaged to avoid aliasing, up to
+//! a reduction by eight along each axis.
 
 use image::{DynamicImage, ImageBuffer, Pixel};
 use rayon::prelude::*;
 
 use deltille_core::camera::PixelMap;
 
-/// Most samples along each side of a pixel; a pixel that covers more pixels of the source is
-/// averaged over so many.
+/// Maximum number of samples along each side of a pixel. A pixel that covers more source pixels is averaged over this number.
 const MOST_PLACES: f32 = 8.0;
 
-/// Parameter a of the cubic convolution of Keys (1981) for which it is of third order.
+/// Parameter a of the cubic convolution of Keys (1981) that gives third-order accuracy.
 const KEYS: f32 = -0.5;
 
-/// Most channels of a pixel.
+/// Maximum number of channels of a pixel.
 const MOST_CHANNELS: usize = 4;
 
-/// Resamples `image` at the places of `map`, px in `image` for each pixel of the result, by bicubic
-/// interpolation; a pixel that covers several is their mean. Pixels without a place are black.
-/// Depth and channels are kept, except that floating-point pictures become 16-bit RGB.
+/// Resamples `image` by bicubic interpolation at the positions of `map`, px in `image` for each pixel of the result. A pixel
+/// that covers several source pixels is their mean. Pixels without a position are black. Depth and channels are kept, except
+/// that floating-point images become 16-bit RGB.
 pub fn remapped(image: &DynamicImage, map: &PixelMap) -> DynamicImage {
     use DynamicImage as D;
     match image {
@@ -85,11 +83,11 @@ where
         }
     });
     let [width, height] = [map.width(), map.height()].map(|side| side as u32);
-    ImageBuffer::from_raw(width, height, pixels).expect("as many as were made")
+    ImageBuffer::from_raw(width, height, pixels)
+        .expect("the buffer has one value per pixel and channel")
 }
 
-/// The mean of the source over a pixel of the result, for each channel; `None` where it has no
-/// place.
+/// The mean of the source over a pixel of the result, for each channel; `None` if the pixel has no position.
 fn seen<P>(
     image: &Buffer<P>,
     map: &PixelMap,
@@ -104,7 +102,7 @@ where
     if here[0].is_nan() {
         return None;
     }
-    // Derivative of the place from pixel to pixel.
+    // Derivative of the position from pixel to pixel.
     let along = |next: Option<[f32; 2]>, sign: f32| {
         next.filter(|next| !next[0].is_nan()).map(|next| [0, 1].map(|i| sign * (next[i] - here[i])))
     };
@@ -130,15 +128,14 @@ where
     Some(sum.map(|sum| sum / (rows * columns)))
 }
 
-/// The weights of four pixels in a row for a place between the middle two.
+/// The weights of four pixels in a row for a position between the middle two.
 fn weights(part: f32) -> [f32; 4] {
     let near = |d: f32| ((KEYS + 2.0) * d - (KEYS + 3.0)) * d * d + 1.0;
     let far = |d: f32| ((KEYS * d - 5.0 * KEYS) * d + 8.0 * KEYS) * d - 4.0 * KEYS;
     [far(1.0 + part), near(part), near(1.0 - part), far(2.0 - part)]
 }
 
-/// The interpolated value at a place of a picture, px; beyond the border the outermost pixels are
-/// repeated.
+/// The interpolated value at a position in an image, px; beyond the border the outermost pixels are repeated.
 fn cubic<P>(image: &Buffer<P>, [x, y]: [f32; 2]) -> [f32; MOST_CHANNELS]
 where
     P: Pixel,

@@ -1,4 +1,4 @@
-//! Targets from files, with the families that they name.
+//! Targets from files, with their families.
 
 use std::path::{Path, PathBuf};
 
@@ -13,33 +13,33 @@ use crate::export::tp::{self, TpError};
 use crate::family_file::{self, FamilyFileError};
 use crate::limits::{Limits, ReadError};
 
-/// Endings of files that are made of a target and do not describe it.
+/// Extensions of files that are generated from a target and do not describe it.
 const MADE: [&str; 8] = ["pdf", "svg", "png", "glb", "obj", "stl", "dxf", "mtl"];
 
-/// Why a target cannot be read.
+/// Error of reading a target.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TargetReadError {
-    /// A file that was made of a target.
-    #[error("{}: a .{extension} describes no target: give the .json written with it", path.display())]
+    /// A file that was generated from a target.
+    #[error("{}: a .{extension} file does not describe a target: use the .json written with it", path.display())]
     Made {
         /// The file.
         path: PathBuf,
-        /// Its ending.
+        /// Its extension.
         extension: String,
     },
-    /// What an interrupted run has left cannot be put in order.
+    /// The leftovers of an interrupted run cannot be cleaned up.
     #[error(transparent)]
     Settle(std::io::Error),
     /// The file cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// The file is no `.dsc`.
+    /// The file is not a valid `.dsc`.
     #[error("{}: {error}", path.display())]
     Dsc {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem.
         error: DscError,
     },
     /// The board poses beside a `.dsc` cannot be used.
@@ -47,25 +47,24 @@ pub enum TargetReadError {
     Tp {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem.
         error: TpError,
     },
-    /// The file is no target.
+    /// The file is not a valid target.
     #[error("{}: {error}", path.display())]
     Json {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem.
         error: TargetFileError,
     },
 }
 
-/// Reads a target with its sheets: `.dsc` by its extension, with the poses of its boards in a `.tp` of the same stem where it has none,
-/// JSON otherwise. What killed runs have left in its folder is put in order
-/// before.
+/// Reads a target with its sheets: a `.dsc` by its extension, otherwise JSON. If a `.dsc` has no poses of its boards, they are
+/// read from the `.tp` with the same stem. Leftovers of killed runs in the folder are cleaned up first.
 ///
 /// # Errors
-/// Where the file cannot be read, or describes no target.
+/// Returns an error if the file cannot be read, or does not describe a target.
 pub fn read(path: &Path, limits: &Limits) -> Result<Printing, TargetReadError> {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     let path_of = || path.to_owned();
@@ -90,55 +89,55 @@ pub fn read(path: &Path, limits: &Limits) -> Result<Printing, TargetReadError> {
     Printing::from_json(&text).map_err(|error| TargetReadError::Json { path: path_of(), error })
 }
 
-/// The board that a description at a path describes, where a new text of the file would not describe its prints: they would
-/// be of no use any more. `None` where there is no such description, or the new text is not one of a target.
+/// Returns the board described at a path if a new text of the file would no longer describe its prints, which would make them
+/// useless. `None` if there is no description, or if the new text is not a target.
 pub fn lost_board(path: &Path, new: &[u8]) -> Option<TargetIdentity> {
     let new = Target::from_json(std::str::from_utf8(new).ok()?).ok()?;
     let there = Target::from_json(&Limits::default().read_text(path).ok()?).ok()?;
     (!new.has_prints_of(&there)).then(|| there.identity())
 }
 
-/// Where the poses of the boards of a `.dsc` are looked for: in the `.tp` of the same stem beside it.
+/// The path of the board poses of a `.dsc`: the `.tp` with the same stem.
 fn poses_beside(path: &Path) -> PathBuf {
     path.with_extension("tp")
 }
 
-/// What is missing of a target that was read from a file, as a sentence without full stop: where the boards of a `.dsc`
-/// are to each other. They are taken as boards that lie about then.
+/// Returns a warning, without a full stop, if a `.dsc` lacks the relative poses of its boards. The boards are then treated as
+/// independent.
 pub fn without_poses(path: &Path, target: &Target) -> Option<String> {
     let [one, other] = target.overlapping_boards()?;
     Some(format!(
-        "{}: boards {one} and {other} are listed in the same place, so the poses of its {} boards on the target are \
-         missing and each board is taken by itself; if they are fixed to each other, put {} beside it",
+        "{}: boards {one} and {other} have the same position, so the poses of its {} boards on the target are \
+         missing, and each board is treated as independent; if the boards are fixed to each other, put {} beside this file",
         path.display(),
         target.panels.len(),
         poses_beside(path).file_name().unwrap_or_default().display()
     ))
 }
 
-/// Why the family of a target cannot be had.
+/// Error of finding the family of a target.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TargetFamilyError {
-    /// The family that was given cannot be read.
+    /// The given family cannot be read.
     #[error(transparent)]
     Given(FamilyFileError),
-    /// The family that the target names cannot be read.
-    #[error("{target} carries tags of {name}: {error}")]
+    /// The family named by the target cannot be read.
+    #[error("{target} has tags of {name}: {error}")]
     Named {
         /// The target's name.
         target: String,
         /// The family's name.
         name: String,
-        /// Why.
+        /// The cause.
         error: Box<FamilyFileError>,
     },
-    /// A family that is not what its file claims.
-    #[error("{name} is not what it claims: {failure}")]
+    /// A family that does not satisfy the claims of its file.
+    #[error("{name} does not satisfy the claims of its file: {failure}")]
     Rejected {
         /// The family's name.
         name: String,
-        /// The first claim that does not hold.
+        /// The first false claim.
         failure: String,
     },
     /// A family with other codes.
@@ -146,17 +145,18 @@ pub enum TargetFamilyError {
     Other {
         /// The target's name.
         target: String,
-        /// What is another.
+        /// The difference.
         why: OtherFamily,
     },
 }
 
-/// Sets the family of a target's tags: the one given, else by the name in the target, else by the path in its spec. Its codes
-/// must be those that the target was made with, perhaps with others after them, and as far apart as the family claims:
-/// decoding relies on that. A target without tags needs none.
+/// Sets the family of a target's tags: the given one, else the one named in the target, else the one at the path in its spec.
+/// The family must begin with the codes that the target was made with. Its codes must have the claimed distance, because
+/// decoding relies on it. A target without tags needs no family.
 ///
 /// # Errors
-/// Where it cannot be read, has other codes, or some that are closer than it claims, or the target has no tags.
+/// Returns an error if the family cannot be read, has other codes, or has codes that are closer than claimed, or if a family is
+/// given for a target without tags.
 pub fn set_family(target: &mut Target, given: Option<&str>) -> Result<(), TargetFamilyError> {
     let name = target.name.to_string();
     let other = |why| TargetFamilyError::Other { target: name, why };
@@ -170,13 +170,13 @@ pub fn set_family(target: &mut Target, given: Option<&str>) -> Result<(), Target
     }
 }
 
-/// The family that is wanted, checked.
+/// Returns the wanted family after checking it.
 fn family(
     target: &Target,
     wanted: &FamilyRef,
     given: Option<&str>,
 ) -> Result<Family, TargetFamilyError> {
-    // A file that is given is that of the square tags, where it has such, and there are others.
+    // If the target also has other tags, a given file with square tags is the family of its square tags.
     let given = given.map(|given| family_file::resolve(given).map_err(TargetFamilyError::Given));
     let given = given.transpose()?;
     let Some(squares) = &wanted.squares else {
@@ -191,7 +191,7 @@ fn family(
     Ok(family.with_squares(squares))
 }
 
-/// The family by its name, or the one at the path if that is it, and it is not the one of this name.
+/// Returns the family with the given name, or the one at the path if only that one matches.
 fn named_family(
     target: &Target,
     wanted: &FamilyRef,
@@ -209,8 +209,8 @@ fn named_family(
     }
 }
 
-/// A family of a target: the one given, else by its name, else by its path in the spec. One's own family may have the
-/// name of one that ships.
+/// Returns a family of a target: the given one, else by its name, else by its path in the spec. A user's family may have the
+/// name of a shipped one.
 fn one_family(
     target: &Target,
     wanted: &FamilyRef,
@@ -228,7 +228,7 @@ fn one_family(
     target
         .check_family(wanted, &family)
         .map_err(|why| TargetFamilyError::Other { target: target.name.to_string(), why })?;
-    // Those that are shipped were compared when they were made.
+    // Shipped families were checked when they were made.
     let is_shipped = Family::shipped(family.name()).is_ok_and(|shipped| shipped == family);
     if !is_shipped
         && family.len() <= PAIRS_COUNTED

@@ -151,12 +151,12 @@ fn inconsistent_tables_are_rejected() {
     };
     assert_eq!(
         error(&[&corners]),
-        "picture 0.png: corners of it, but it is not in the table of pictures"
+        "image 0.png: it has corners, but it is not in the `pictures` table"
     );
-    assert_eq!(error(&[&rows, &rows]), "picture 0.png: it stands twice in the table of pictures");
+    assert_eq!(error(&[&rows, &rows]), "image 0.png: it is listed twice in the `pictures` table");
     let twice = error(&[&rows, &corners, &corners]);
     assert!(
-        twice.starts_with("picture 0.png: grids[0].corners[1]: another corner has this row"),
+        twice.starts_with("image 0.png: grids[0].corners[1]: another corner has the same row"),
         "{twice}"
     );
 

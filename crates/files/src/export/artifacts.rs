@@ -1,4 +1,4 @@
-//! All that is made of a target, in memory, and sets of files written all or none.
+//! All files of a target, in memory, and sets of files that are written all or none.
 //!
 //! ```
 //! use deltille_layout::Printing;
@@ -34,10 +34,10 @@ use deltille_layout::Printing;
 use deltille_layout::artwork;
 use deltille_layout::artwork::{ArtworkError, CuttingError};
 
-/// Resolution of PNG pages, dots per inch, where none is asked for.
+/// Default resolution of PNG pages, dots per inch.
 pub const DEFAULT_DPI: f64 = 300.0;
 
-/// What can be made of a target.
+/// The kinds of files that can be made of a target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum What {
@@ -59,7 +59,7 @@ pub enum What {
     Sdf,
     /// `<name>.urdf`, likewise for ROS.
     Urdf,
-    /// `<name>.xml`, likewise for MuJoCo; where there are several textures, with an OBJ for each, too.
+    /// `<name>.xml`, likewise for MuJoCo; several textures also have an OBJ each.
     Mjcf,
     /// `<name>.usda`, with its textures.
     Usd,
@@ -83,13 +83,13 @@ pub enum What {
     Kalibr,
 }
 
-/// A text that is nothing that can be made.
+/// An unknown name of a format.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is no format: {choice}", choice = What::choice())]
+#[error("unknown format `{0}` (known: {choice})", choice = What::choice())]
 pub struct WhatError(String);
 
 impl What {
-    /// All by name. What has several names is listed by the first.
+    /// All kinds by name. Lists show only the first of several names.
     pub const NAMED: [(&str, Self); 24] = [
         ("json", Self::Json),
         ("pdf", Self::Pdf),
@@ -117,7 +117,7 @@ impl What {
         ("kalibr", Self::Kalibr),
     ];
 
-    /// What has textures.
+    /// The kinds that have textures.
     pub const TEXTURED: [Self; 6] =
         [Self::Gltf, Self::Obj, Self::Sdf, Self::Urdf, Self::Mjcf, Self::Usd];
 
@@ -139,15 +139,15 @@ impl FromStr for What {
     }
 }
 
-/// How it is made.
+/// Settings of making files.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Making {
     /// Resolution of PNG pages, dots per inch.
     pub dpi: f64,
-    /// How meshes are made.
+    /// Settings of meshes.
     pub mesh: Meshing,
-    /// Width that the beam of a laser takes away, mm.
+    /// Width removed by the laser beam (kerf), mm.
     pub kerf_mm: f64,
 }
 
@@ -157,51 +157,49 @@ impl Default for Making {
     }
 }
 
-/// Why something cannot be made of a target.
+/// Error of making files of a target.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MakeError {
     /// It cannot be drawn.
     #[error(transparent)]
     Draw(#[from] ArtworkError),
-    /// It was not laid out on paper.
-    #[error("{0} was not laid out on paper: there is no page to draw")]
+    /// It has no layout on paper.
+    #[error("{0} has no layout on paper, so there is no page to draw")]
     NoSheets(String),
     /// A page is too large for the format.
     #[error("a page cannot be drawn: {0}")]
     Page(io::Error),
-    /// No list can be made of it.
+    /// It cannot be written as a list of boards.
     #[error(transparent)]
     Dsc(#[from] DscError),
-    /// No mesh can be made of it.
+    /// It cannot be made as a mesh.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// It is no solid.
-    #[error("{0} is no solid: only solids are meshes")]
+    /// It is not a solid.
+    #[error("{0} is not a solid: only solids have a mesh")]
     NotSolid(String),
     /// It has no skeleton.
     #[error("{0} has no skeleton: set {SolidSkeleton}")]
     NoSkeleton(String),
-    /// Its specification makes none.
+    /// Its specification does not give one.
     #[error(transparent)]
     Target(#[from] TargetError),
-    /// Kalibr does not read it.
-    #[error(
-        "{0} is nothing that Kalibr reads: take an AprilGrid of aprilTag36h11 with a border of 2 bits"
-    )]
+    /// Kalibr does not support it.
+    #[error("Kalibr cannot read {0}: use an AprilGrid of aprilTag36h11 with a border of 2 bits")]
     NotKalibr(String),
     /// There is nothing to cut.
     #[error(transparent)]
     Cutting(#[from] CuttingError),
 }
 
-/// Files in memory, with their names.
+/// Names and contents of files in memory.
 pub type Files = Vec<(String, Vec<u8>)>;
 
-/// The files of one kind that are made of a target.
+/// Makes the files of one kind of a target.
 ///
 /// # Errors
-/// Where the target has none of that kind, or the family of its tags is unknown.
+/// Returns an error if the target has no files of this kind, or if the family of its tags is unknown.
 pub fn make(printing: &Printing, what: What, making: Making) -> Result<Files, MakeError> {
     let target = &printing.target;
     let name = &target.name;
@@ -248,8 +246,8 @@ pub fn make(printing: &Printing, what: What, making: Making) -> Result<Files, Ma
     })
 }
 
-/// The files of a mesh in one format: [`What::Gltf`], [`What::Obj`], or a model for a simulator; none of what is not made of a
-/// mesh.
+/// Returns the files of a mesh in one format: [`What::Gltf`], [`What::Obj`], or a model for a simulator. Kinds that are not made
+/// of a mesh have no files.
 pub fn of_mesh(mesh: &TexturedMesh, what: What) -> Files {
     let (name, count) = (&mesh.name, mesh.textures.len());
     let named = |end: &str, text: String| (format!("{name}{end}"), text.into_bytes());
@@ -316,7 +314,7 @@ fn drawn(printing: &Printing, what: What, making: Making) -> Result<Files, MakeE
     })
 }
 
-/// Why a set of files was not written.
+/// Error of writing a set of files.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SetError {
@@ -325,31 +323,31 @@ pub enum SetError {
     Folder {
         /// The folder.
         folder: PathBuf,
-        /// Why.
+        /// The cause.
         source: io::Error,
     },
     /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] atomic::WriteError),
-    /// What would be replaced cannot be looked at.
+    /// The file that would be replaced cannot be read.
     #[error("cannot read {}, which would be replaced: {source}", path.display())]
     Unread {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: ReadError,
     },
-    /// Something else is there.
-    #[error("{} holds {found}, which would be lost: choose another place to write to, or `overwrite` it", path.display())]
+    /// A file of another kind exists.
+    #[error("{} contains {found}, which would be lost: choose another path, or set `overwrite`", path.display())]
     Taken {
         /// The file.
         path: PathBuf,
-        /// What is there.
+        /// The kind of the existing file.
         found: String,
     },
-    /// The description of another board is there.
+    /// The description of another board exists.
     #[error(
-        "{} describes another board, {board}, whose prints need it: choose another name or folder to keep both, or `overwrite` it",
+        "{} describes another board, {board}, whose prints need it: choose another name or folder to keep both, or set `overwrite`",
         path.display()
     )]
     Board {
@@ -360,11 +358,11 @@ pub enum SetError {
     },
 }
 
-/// Writes files into a folder, all or none, see [`crate::export::writing::staging`], and returns where they are. A file that is there
-/// already is replaced where it is of the same kind, or with `overwrite`; the description of another board only with that.
+/// Writes files into a folder, all or none (see [`crate::export::writing::staging`]), and returns their paths. An existing file of
+/// the same kind is replaced. A file of another kind, and the description of another board, are replaced only with `overwrite`.
 ///
 /// # Errors
-/// Where something else is there, or nothing can be written.
+/// Returns an error if an existing file would be lost, or if the files cannot be written.
 pub fn write_set(
     folder: &Path,
     files: &[(String, Vec<u8>)],

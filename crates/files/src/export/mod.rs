@@ -1,13 +1,12 @@
 //! Artwork, targets and results to files and back, one module for each format.
 //!
-//! In the order in which they come to be: `pages` (artwork as PDF, SVG, PNG, and drawings for cutters), `meshes` (targets in
-//! space), `corners` (detections, lists of boards), `cameras` (calibrations and what follows from them); `writing` puts all of
-//! them on disk, and [`artifacts`] makes all that there is of a target.
+//! In the order of their use: `pages` (artwork as PDF, SVG, PNG, and drawings for cutters), `meshes` (targets in space),
+//! `corners` (detections, lists of boards), `cameras` (calibrations and their applications). `writing` writes files to disk, and
+//! [`artifacts`] makes all files of a target.
 //!
-//! Writers of artwork take shapes in millimetres and only convert units and syntax; writers of
-//! targets and results return text. Files appear completely or not at all (see [`atomic`]), and
-//! sets of files together (see [`staging`]); [`kind`] recognises what an existing file is before it
-//! is replaced.
+//! Writers of artwork take shapes in millimetres and only convert units and syntax; writers of targets and results return text.
+//! Files appear completely or not at all (see [`atomic`]), and sets of files together (see [`staging`]). [`kind`] recognises an
+//! existing file before it is replaced.
 
 #[cfg(all(feature = "meshes", feature = "print"))]
 pub mod artifacts;
@@ -43,7 +42,7 @@ use std::path::PathBuf;
 #[cfg(feature = "print")]
 pub use pages::supersample::{Block, SUBPIXELS, render as supersample};
 
-/// Why a file was not written.
+/// Error of writing a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
@@ -51,20 +50,20 @@ pub enum ExportError {
     #[error(transparent)]
     Write(#[from] atomic::WriteError),
     /// A page is larger than the format allows.
-    #[error("{path}: a page of {width_mm} x {height_mm} mm is too large, {limit}")]
+    #[error("{path}: a page of {width_mm} x {height_mm} mm is too large: {limit}")]
     TooLarge {
-        /// The file asked for.
+        /// The requested file.
         path: PathBuf,
         /// Page width, mm.
         width_mm: f64,
         /// Page height, mm.
         height_mm: f64,
-        /// The limit, and what to do.
+        /// The limit and the remedy.
         limit: String,
     },
 }
 
-/// Name and version of this program, as all file formats with a place for it state them.
+/// Name and version of this program, written to all file formats with a field for it.
 pub const GENERATOR: &str = concat!("deltille ", env!("CARGO_PKG_VERSION"));
 
 /// The file name of the drawing of a board for a laser: `name-laser.dxf`, `name-laser.svg`.
@@ -72,8 +71,7 @@ pub fn laser_file_name(name: &str, extension: &str) -> String {
     format!("{name}-laser.{extension}")
 }
 
-/// The file name of sheet `index` (from 0) of `count`: `name.svg`, or `name-2.svg` when there are
-/// several.
+/// The file name of sheet `index` (from 0) of `count`: `name.svg`, or for several sheets `name-2.svg`.
 pub fn sheet_file_name(name: &str, index: usize, count: usize, extension: &str) -> String {
     match count {
         1 => format!("{name}.{extension}"),

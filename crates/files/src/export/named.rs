@@ -1,18 +1,18 @@
-//! Formats by name. Options, help texts and errors are made from one table for each kind of format.
+//! Formats selected by name. Each kind of format is a table from which options, help texts and errors are generated.
 
 /// A format, as a line of a table.
 pub trait Format: Sync + 'static {
-    /// Its name in options and keywords.
+    /// The name that selects the format.
     fn name(&self) -> &'static str;
 
-    /// A phrase for help texts that says what is written.
+    /// Description of the output for a help text.
     fn help(&self) -> String;
 }
 
-/// Returns the format of that name.
+/// Returns the format with the given name.
 ///
 /// # Errors
-/// Returns an error that lists the known names if no format has this name.
+/// Returns a message with the known names if there is no such format.
 pub fn named<'a, F: Format>(
     all: impl IntoIterator<Item = &'a F>,
     name: &str,

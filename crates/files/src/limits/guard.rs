@@ -1,4 +1,4 @@
-//! Third-party code under guard: panics become errors, and endless work is abandoned after a time.
+//! Guards for third-party code: panics become errors, and endless work is abandoned after a time limit.
 
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};
@@ -6,19 +6,19 @@ use std::sync::{Once, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Stack of a thread that runs third-party code, bytes: their readers recurse for each level of a
-/// file. Only the part that is used takes memory.
+/// Stack size of a thread that runs third-party code, bytes: readers recurse for each level of a
+/// file. Only the used part takes memory.
 const STACK_BYTES: usize = 256 << 20;
 
-/// Why guarded code gave no result.
+/// Reason why guarded code returned no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Broken {
     /// The code panicked, or no thread could be started for it.
-    #[error("its reader failed within; the file is damaged, or made to do that")]
+    #[error("the reader crashed; the file is damaged or malicious")]
     Panic,
     /// The code did not finish in time.
-    #[error("the time is over")]
+    #[error("the time limit is exceeded")]
     Time,
 }
 
@@ -30,7 +30,7 @@ thread_local! {
 /// printed.
 ///
 /// # Errors
-/// [`Broken::Panic`] when the code panics.
+/// Returns [`Broken::Panic`] if the code panics.
 pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, Broken> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -42,17 +42,17 @@ pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, Broken> {
         }));
     });
     let before = IS_QUIET.replace(true);
-    // State that the code may have left inconsistent is not used after a panic.
+    // Inconsistent state is not used after a panic.
     let result = panic::catch_unwind(AssertUnwindSafe(work));
     IS_QUIET.set(before);
     result.map_err(|_| Broken::Panic)
 }
 
-/// Runs third-party code as [`caught`] does, on a thread with a deep stack, for at most `time`.
-/// After that the thread goes on, unheard, until it or the process ends.
+/// Runs third-party code like [`caught`], on a thread with a deep stack, for at most `time`.
+/// After that the thread continues, ignored, until it or the process ends.
 ///
 /// # Errors
-/// [`Broken::Panic`], or [`Broken::Time`].
+/// Returns [`Broken::Panic`] or [`Broken::Time`].
 pub fn bounded<T: Send + 'static>(
     time: Duration,
     work: impl FnOnce() -> T + Send + 'static,
@@ -60,21 +60,21 @@ pub fn bounded<T: Send + 'static>(
     let (sender, receiver) = mpsc::sync_channel(1);
     let thread = thread::Builder::new().stack_size(STACK_BYTES);
     let run = move || {
-        // The receiver is gone when the time is over.
+        // After the time limit, the receiver no longer exists.
         let _ = sender.send(caught(work));
     };
     thread.spawn(run).map_err(|_| Broken::Panic)?;
     receiver.recv_timeout(time).map_err(|_| Broken::Time)?
 }
 
-/// How third-party code is run, which may panic or never end.
+/// How to run third-party code that may panic or never end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Guard {
-    /// On the calling thread and without a time limit, as [`caught`] does: for platforms without
-    /// threads, such as a browser. Endless work is not noticed, and the stack is no deeper.
+    /// On the calling thread without a time limit, like [`caught`]: for platforms without threads, for example a
+    /// browser. Endless work is not detected, and the stack is not enlarged.
     #[default]
     Here,
-    /// On a thread of its own with a time limit, as [`bounded`] does.
+    /// On a separate thread with a time limit, like [`bounded`].
     Timed,
 }
 
@@ -82,7 +82,7 @@ impl Guard {
     /// Runs third-party code, for at most `time` with [`Guard::Timed`].
     ///
     /// # Errors
-    /// [`Broken::Panic`], or [`Broken::Time`].
+    /// Returns [`Broken::Panic`] or [`Broken::Time`].
     pub fn run<T: Send + 'static>(
         self,
         time: Duration,
@@ -94,7 +94,7 @@ impl Guard {
         }
     }
 
-    /// The instant at which a time that begins now is over; `None` without a time limit.
+    /// The instant at which `time` from now has passed; `None` without a time limit.
     pub fn end(self, time: Duration) -> Option<Instant> {
         match self {
             Self::Here => None,

@@ -1,5 +1,5 @@
-//! Limits on what is read, so that no file, whoever made it, exhausts memory or time. `guard` runs third-party
-//! code with a timeout, and turns its panics into errors.
+//! Limits on files that are read, so that no file, even a malicious one, exhausts memory or time. `guard` runs third-party
+//! code with a time limit and turns its panics into errors.
 //!
 //! ```
 //! use deltille_files::limits::Limits;
@@ -9,12 +9,11 @@
 //! let error = small.read("Cargo.toml".as_ref()).unwrap_err();
 //! assert_eq!(
 //!     error.to_string(),
-//!     "Cargo.toml: more than 10 bytes; `Limits::max_bytes` sets how many are read"
+//!     "Cargo.toml: more than 10 bytes; `Limits::max_bytes` sets this limit"
 //! );
 //! ```
 //!
-//! The defaults accept everything that this crate writes and photographs of up to 150 megapixels,
-//! and stay within a gigabyte of memory.
+//! The defaults accept all files that this crate writes and photographs of up to 150 megapixels, within one gigabyte of memory.
 
 mod guard;
 
@@ -31,37 +30,35 @@ use deltille_core::setting::Setting::{
 
 pub use guard::{Broken, Guard, bounded, caught};
 
-/// Most bytes of a settings file: a camera, a template, rules. Most have a hundredth of it, and
-/// readers of YAML take time quadratic in it.
+/// Maximum size of a settings file (camera, template, rules), bytes. Most are a hundred times smaller, and YAML readers take
+/// quadratic time.
 pub const MAX_SETTINGS_BYTES: usize = 50_000;
 
-/// Most bytes of a family file or of a checkpoint of its search: twice as many as the three million
-/// codes of the largest family take.
+/// Maximum size of a family file or of a checkpoint of its search, bytes: twice the size of the largest
+/// family, which has three million codes.
 pub const MAX_FAMILY_BYTES: usize = 150_000_000;
 
-/// Pixels that a picture may have whatever the size of its file.
+/// Number of pixels up to which an image is accepted regardless of its file size.
 const FREE_PIXELS: u64 = 10_000_000;
 
-/// Bytes of memory for each pixel while a picture is decoded: four channels of 8 bits.
+/// Bytes of memory per pixel while an image is decoded: four channels of 8 bits.
 const BYTES_PER_PIXEL: u64 = 4;
 
 /// Limits within which a reader accepts a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Limits {
-    /// Bytes of a file, and of what is decompressed from it; pictures are limited by their pixels
-    /// instead.
+    /// Bytes of a file, and of its decompressed content. Images are limited by their pixels instead.
     pub max_bytes: u64,
-    /// Pixels of a picture: of a photograph, of a page or texture as PNG, and of all photographs, or
-    /// textures of a mesh, that are in memory at a time.
+    /// Pixels of an image (photograph, page or texture as PNG), and of all photographs, or all textures
+    /// of a mesh, that are in memory at the same time.
     pub max_pixels: u64,
-    /// Pixels for each byte of its file, of a photograph of more than 10 megapixels. The noise of a
-    /// sensor cannot be compressed away: a compressed photograph has some 5, and a file with far
-    /// more was made to exhaust its reader.
+    /// Pixels per byte of the file of a photograph with more than 10 megapixels. Sensor noise does not compress: a
+    /// compressed photograph has about 5 pixels per byte, and a file with far more was made to exhaust its reader.
     pub max_pixels_per_byte: u64,
-    /// Parts of a file: elements of an SVG, operators of a PDF page, nodes and triangles of a mesh.
+    /// Number of parts of a file: elements of an SVG, operators of a PDF page, nodes and triangles of a mesh.
     pub max_nodes: u64,
-    /// Depth to which parts may be nested.
+    /// Nesting depth of parts.
     pub max_depth: usize,
     /// Seconds for each step of third-party code: reading a file, drawing a page.
     pub max_seconds: f64,
@@ -112,49 +109,49 @@ impl fmt::Display for Exceeded {
         let limit = self.limit;
         match self.kind {
             Kind::Bytes => {
-                write!(f, "more than {limit} bytes; {LimitsMaxBytes} sets how many are read")
+                write!(f, "more than {limit} bytes; {LimitsMaxBytes} sets this limit")
             }
             Kind::Pixels => {
                 let mega = limit / 1e6;
-                write!(f, "more than {mega} megapixels; {LimitsMaxPixels} sets how many are read")
+                write!(f, "more than {mega} megapixels; {LimitsMaxPixels} sets this limit")
             }
             Kind::PixelsPerByte => {
-                write!(f, "more than {limit} pixels for each byte, as no photograph has; ")?;
-                write!(f, "{LimitsMaxPixelsPerByte} sets how many are read")
+                write!(f, "more than {limit} pixels per byte, which no photograph has; ")?;
+                write!(f, "{LimitsMaxPixelsPerByte} sets this limit")
             }
             Kind::Nodes => {
-                write!(f, "more than {limit} parts; {LimitsMaxNodes} sets how many are read")
+                write!(f, "more than {limit} parts; {LimitsMaxNodes} sets this limit")
             }
             Kind::Depth => {
                 write!(
                     f,
-                    "parts more than {limit} deep; {LimitsMaxDepth} sets how deep they may be"
+                    "parts nested more than {limit} levels deep; {LimitsMaxDepth} sets this limit"
                 )
             }
             Kind::Seconds => {
-                write!(f, "not done after {limit} s; {LimitsMaxSeconds} sets how long it may take")
+                write!(f, "not finished after {limit} s; {LimitsMaxSeconds} sets this limit")
             }
         }
     }
 }
 
-/// Why a file is not read.
+/// Error of reading a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReadError {
     /// The path is empty.
-    #[error("no file is named: name one, or leave it out")]
+    #[error("the file name is empty: name a file, or leave the option out")]
     Nameless,
     /// The file cannot be opened or read.
     #[error("cannot read {}: {source}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The error of the system.
         source: io::Error,
     },
-    /// The path is a folder, a device or a pipe, which may never end.
-    #[error("{}: {what}, where a file is needed", path.display())]
+    /// The path is a folder, or a device or pipe, which may never end.
+    #[error("{}: {what}, but a file is needed", path.display())]
     NotFile {
         /// The path.
         path: PathBuf,
@@ -170,11 +167,11 @@ pub enum ReadError {
         exceeded: Exceeded,
     },
     /// The file has more bytes than a file of its kind may have.
-    #[error("{}: more than {most} bytes, which no such file has", path.display())]
+    #[error("{}: more than {most} bytes, the maximum for this kind of file", path.display())]
     TooLong {
         /// The file.
         path: PathBuf,
-        /// The most bytes of a file of this kind.
+        /// The maximum size of a file of this kind, bytes.
         most: usize,
     },
     /// The file is not UTF-8 text.
@@ -199,7 +196,7 @@ impl Limits {
     /// Reads the bytes of a regular file.
     ///
     /// # Errors
-    /// When the file cannot be read, is not a regular file, or is larger than
+    /// Returns an error if the file cannot be read, is not a regular file, or is larger than
     /// [`max_bytes`](Self::max_bytes).
     pub fn read(&self, path: &Path) -> Result<Vec<u8>, ReadError> {
         let exceeded = self.exceeded(Kind::Bytes);
@@ -210,13 +207,13 @@ impl Limits {
     /// Reads a regular file as UTF-8 text.
     ///
     /// # Errors
-    /// When the file cannot be read, is not a regular file, is larger than
+    /// Returns an error if the file cannot be read, is not a regular file, is larger than
     /// [`max_bytes`](Self::max_bytes), or is not UTF-8.
     pub fn read_text(&self, path: &Path) -> Result<String, ReadError> {
         text(path, self.read(path)?)
     }
 
-    /// The error that says that this limit is exceeded.
+    /// Returns the error for exceeding this limit.
     pub fn exceeded(&self, kind: Kind) -> Exceeded {
         let limit = match kind {
             Kind::Bytes => self.max_bytes as f64,
@@ -229,26 +226,26 @@ impl Limits {
         Exceeded { kind, limit }
     }
 
-    /// Refuses a picture of more than [`max_pixels`](Self::max_pixels).
+    /// Refuses an image with more than [`max_pixels`](Self::max_pixels).
     ///
     /// # Errors
-    /// The limit that it passes.
+    /// Returns the limit that is exceeded.
     pub fn check_pixels(&self, width: u32, height: u32) -> Result<(), Exceeded> {
         self.check_all_pixels(u64::from(width) * u64::from(height))
     }
 
-    /// Refuses pictures that have more than [`max_pixels`](Self::max_pixels) together.
+    /// Refuses images that together have more than [`max_pixels`](Self::max_pixels).
     ///
     /// # Errors
-    /// The limit that they pass.
+    /// Returns the limit that is exceeded.
     pub fn check_all_pixels(&self, pixels: u64) -> Result<(), Exceeded> {
         self.check(Kind::Pixels, pixels, self.max_pixels)
     }
 
-    /// Refuses a photograph of too many pixels, or of too many for a file of `bytes` bytes.
+    /// Refuses a photograph with too many pixels, or with too many for a file of `bytes` bytes.
     ///
     /// # Errors
-    /// The limit that it passes.
+    /// Returns the limit that is exceeded.
     pub fn check_photograph(&self, width: u32, height: u32, bytes: u64) -> Result<(), Exceeded> {
         self.check_pixels(width, height)?;
         let pixels = u64::from(width) * u64::from(height);
@@ -256,10 +253,10 @@ impl Limits {
         self.check(Kind::PixelsPerByte, pixels, most)
     }
 
-    /// Refuses a file of more than [`max_nodes`](Self::max_nodes) parts.
+    /// Refuses a file with more than [`max_nodes`](Self::max_nodes) parts.
     ///
     /// # Errors
-    /// The limit that they pass.
+    /// Returns the limit that is exceeded.
     pub fn check_nodes(&self, nodes: usize) -> Result<(), Exceeded> {
         self.check(Kind::Nodes, nodes as u64, self.max_nodes)
     }
@@ -267,18 +264,17 @@ impl Limits {
     /// Refuses parts that are nested deeper than [`max_depth`](Self::max_depth).
     ///
     /// # Errors
-    /// The limit that they pass.
+    /// Returns the limit that is exceeded.
     pub fn check_depth(&self, depth: usize) -> Result<(), Exceeded> {
         self.check(Kind::Depth, depth as u64, self.max_depth as u64)
     }
 
-    /// Most bytes of a decoded picture, and of its file, which is hardly larger.
+    /// Maximum size of a decoded image, bytes, and of its file, which is hardly larger.
     pub fn picture_bytes(&self) -> u64 {
         self.max_pixels.saturating_mul(BYTES_PER_PIXEL)
     }
 
-    /// [`max_seconds`](Self::max_seconds) as a duration, the longest one where it cannot be
-    /// represented.
+    /// [`max_seconds`](Self::max_seconds) as a duration; the maximum duration if the value is too large.
     pub fn time(&self) -> Duration {
         Duration::try_from_secs_f64(self.max_seconds).unwrap_or(Duration::MAX)
     }
@@ -291,16 +287,16 @@ impl Limits {
 /// Reads a regular file of at most `most` bytes as UTF-8 text.
 ///
 /// # Errors
-/// When the file cannot be read, is not a regular file, is longer than `most`, or is not UTF-8.
+/// Returns an error if the file cannot be read, is not a regular file, is longer than `most`, or is not UTF-8.
 pub fn read_short_text(path: &Path, most: usize) -> Result<String, ReadError> {
     let bytes = read_up_to(path, most as u64)?;
     text(path, bytes.ok_or_else(|| ReadError::TooLong { path: path.to_owned(), most })?)
 }
 
-/// Refuses a path that is not a regular file. A pipe is not opened, as that may wait for ever.
+/// Refuses a path that is not a regular file. Pipes are not opened, because that may block for ever.
 ///
 /// # Errors
-/// When the metadata cannot be read, or the path is not a regular file.
+/// Returns an error if the metadata cannot be read, or if the path is not a regular file.
 pub fn check_file(path: &Path) -> Result<(), ReadError> {
     if path.as_os_str().is_empty() {
         return Err(ReadError::Nameless);
@@ -314,7 +310,7 @@ pub fn check_file(path: &Path) -> Result<(), ReadError> {
     Err(ReadError::NotFile { path: path.to_owned(), what })
 }
 
-/// The bytes of a regular file; `None` when there are more than `most`.
+/// Returns the bytes of a regular file; `None` if there are more than `most`.
 fn read_up_to(path: &Path, most: u64) -> Result<Option<Vec<u8>>, ReadError> {
     check_file(path)?;
     let io = |source| ReadError::Io { path: path.to_owned(), source };

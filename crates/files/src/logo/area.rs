@@ -1,4 +1,4 @@
-//! Areas of the plane within closed outlines, and what is common to them.
+//! Areas of the plane within closed outlines, and their unions, differences and intersections.
 
 use glam::DVec2;
 use i_overlay::core::fill_rule::FillRule;
@@ -6,7 +6,7 @@ use i_overlay::core::overlay_rule::OverlayRule;
 use i_overlay::float::simplify::SimplifyShape;
 use i_overlay::float::single::SingleFloatOverlay;
 
-/// What an area is printed in.
+/// The colour of an area.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Tone {
     /// Ink.
@@ -15,7 +15,7 @@ pub(super) enum Tone {
     White,
 }
 
-/// Closed outlines of straight lines, and which side of them is within.
+/// Closed outlines of straight lines, and their fill rule.
 pub(super) struct Straight {
     pub outlines: Vec<Vec<[f64; 2]>>,
     pub rule: FillRule,
@@ -27,30 +27,30 @@ impl Straight {
     }
 }
 
-/// An area; its outlines do not cross, outer ones run one way and holes the other.
+/// An area. Its outlines do not cross; outer outlines and holes have opposite orientations.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Area {
     outlines: Vec<Vec<[f64; 2]>>,
 }
 
 impl Area {
-    /// What is within outlines that may cross.
+    /// The area within outlines that may cross.
     pub(super) fn within(outlines: &[Vec<[f64; 2]>], rule: FillRule) -> Self {
         Self::of(outlines.to_vec().simplify_shape(rule))
     }
 
-    /// All that is in one of several.
+    /// The union of several areas.
     pub(super) fn union<'a>(areas: impl IntoIterator<Item = &'a Self>) -> Self {
         let outlines: Vec<_> = areas.into_iter().flat_map(|area| area.outlines.clone()).collect();
         Self::within(&outlines, FillRule::NonZero)
     }
 
-    /// What is in this and not in another.
+    /// The difference of this area and another.
     pub(super) fn without(&self, other: &Self) -> Self {
         self.combined(other, OverlayRule::Difference)
     }
 
-    /// What is in both.
+    /// The intersection of this area and another.
     pub(super) fn common(&self, other: &Self) -> Self {
         self.combined(other, OverlayRule::Intersect)
     }

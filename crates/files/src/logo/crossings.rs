@@ -1,11 +1,11 @@
-//! How often outlines meet. The union of areas has a corner at each crossing, so that a small file of long lines across each
-//! other would take all memory.
+//! The number of crossings of outlines. The union of areas has a corner at each crossing, so a small file with long crossing
+//! lines could exhaust memory.
 
 use glam::DVec2;
 
 use super::area::Straight;
 
-/// Whether at most so many pairs of lines meet other than in their common end.
+/// Whether at most `most` pairs of lines meet outside a common end.
 pub(super) fn are_at_most<'a>(most: usize, all: impl Iterator<Item = &'a Straight>) -> bool {
     let mut lines: Vec<[DVec2; 2]> = Vec::new();
     for outline in all.flat_map(|straight| &straight.outlines) {
@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_that_cross_or_lie_on_each_other_meet_and_neighbours_do_not() {
+    fn crossing_and_overlapping_lines_meet_but_neighbours_do_not() {
         let line = |a: (f64, f64), b: (f64, f64)| [a, b].map(DVec2::from);
         let level = line((0.0, 0.0), (4.0, 0.0));
         assert!(meet(&level, &line((1.0, -1.0), (2.0, 1.0))));

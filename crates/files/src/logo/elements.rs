@@ -1,5 +1,5 @@
-//! The elements of an SVG before it is understood: what cannot be printed black is refused by its name, and what
-//! would become too much when `use` repeats it.
+//! Checks of the elements of an SVG before it is interpreted. Refuses elements that cannot be printed in black, and files that
+//! `use` would expand too far.
 
 use std::collections::HashMap;
 
@@ -7,20 +7,20 @@ use usvg::roxmltree::{Document, Node, NodeId};
 
 use super::{LogoError, MOST_ELEMENTS};
 
-/// Most levels of elements in each other, also by `use`.
+/// Maximum nesting depth of elements, including `use`.
 const MOST_DEPTH: usize = 100;
 
-/// Elements that have no outline to be filled, and what to do about them. Gradients, clips and filters stand in many
-/// files unused; where they are used it is said of what.
+/// Elements without an outline to fill, and the remedy for each. Many files contain unused gradients, clips and filters;
+/// `painted` refuses them where they are used.
 const REFUSED: [(&str, &str); 8] = [
     ("text", "convert it to paths"),
-    ("image", "trace it, or leave it out"),
-    ("foreignObject", "leave it out"),
+    ("image", "trace it, or remove it"),
+    ("foreignObject", "remove it"),
     ("marker", "convert strokes to paths"),
-    ("mask", "cut the paths instead, or leave it out"),
+    ("mask", "cut the paths instead, or remove it"),
     ("pattern", "fill with a plain colour"),
-    ("switch", "leave it out"),
-    ("animate", "leave it out"),
+    ("switch", "remove it"),
+    ("animate", "remove it"),
 ];
 
 pub(super) fn check(xml: &Document) -> Result<(), LogoError> {
@@ -40,17 +40,17 @@ pub(super) fn check(xml: &Document) -> Result<(), LogoError> {
     Ok(())
 }
 
-/// An element in words.
+/// The description of an element in a message.
 pub(super) fn named(element: &str, id: &str) -> String {
     if id.is_empty() { format!("`{element}`") } else { format!("`{element}` with the id `{id}`") }
 }
 
-/// An element whose name is not known any more: whatever it is, its reader makes paths and groups of it.
+/// The description of an element whose name is lost, because the reader converts all elements to paths and groups.
 pub(super) fn unnamed(id: &str) -> String {
-    if id.is_empty() { "something in it".to_owned() } else { format!("what has the id `{id}`") }
+    if id.is_empty() { "an element".to_owned() } else { format!("the element with the id `{id}`") }
 }
 
-/// How many elements an element becomes.
+/// The number of elements to which an element expands.
 fn count<'a>(
     node: Node<'a, 'a>,
     by_id: &HashMap<&str, Node<'a, 'a>>,

@@ -1,11 +1,11 @@
-//! A logo from an SVG: all that is painted as one black outline.
+//! A logo from an SVG: all painted areas become one black outline.
 //!
-//! `elements` reads the SVG and refuses what cannot be printed black, `painted` follows what is painted over what, with
+//! `elements` checks the SVG and refuses elements that cannot be printed in black. `painted` follows the painting order, with
 //! `crossings` and `area` for outlines.
 //!
-//! White is bare paper, and takes away from what was painted before; every other colour is black. Strokes become the
-//! areas that they cover. What has no outline is refused by its name: texts, pictures, gradients, patterns, masks,
-//! filters, what shines through.
+//! White is bare paper and erases what was painted before; every other colour is black. Strokes become the areas that they
+//! cover. Elements without an outline are refused with their name: texts, images, gradients, patterns, masks, filters,
+//! transparent paint.
 //!
 //! ```
 //! let svg = r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 8 4">
@@ -30,53 +30,54 @@ use usvg::roxmltree::{Document, ParsingOptions};
 use crate::limits::{self, Broken};
 use area::{Area, Tone};
 
-/// Most bytes of an SVG: programs that draw write tens of kilobytes for a logo.
+/// Maximum size of an SVG, bytes: drawing programs write tens of kilobytes for a logo.
 pub const MAX_LOGO_BYTES: usize = 500_000;
 
-/// Most elements, those that `use` repeats included: a tenth of a second for the reader.
+/// Maximum number of elements, including those repeated by `use`: the reader takes a tenth of a second for them.
 const MOST_ELEMENTS: usize = 20_000;
 
-/// How long reading may take: a hundred times what the largest logo needs.
+/// Time limit for reading: a hundred times the time for the largest logo.
 const TIME: Duration = Duration::from_secs(20);
 
-/// Why an SVG is no logo.
+/// Error of reading a logo from an SVG.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogoError {
     /// The file is too long.
-    #[error("more than {MAX_LOGO_BYTES} bytes: save it as plain SVG, without pictures in it")]
+    #[error("more than {MAX_LOGO_BYTES} bytes: save it as plain SVG without embedded images")]
     Bytes,
-    /// It cannot be read.
+    /// The SVG cannot be read.
     #[error("not a readable SVG ({0}): save it as plain SVG")]
     Unreadable(String),
-    /// Something in it has no outline that could be printed black.
+    /// An element has no outline that can be printed in black.
     #[error("{what}: {remedy}")]
     Element {
-        /// The element, and what is wrong with it.
+        /// The element and its problem.
         what: String,
-        /// What to do.
+        /// The remedy.
         remedy: &'static str,
     },
-    /// There is too much of something.
-    #[error("{what}, more than {most}: simplify its paths")]
+    /// A count exceeds its maximum.
+    #[error("more than {most} {what}: simplify the paths")]
     Much {
-        /// What.
+        /// The things counted, in the plural.
         what: &'static str,
-        /// How much of it is read.
+        /// The maximum.
         most: usize,
     },
-    /// Its reader failed, or took too long.
+    /// The reader failed or took too long.
     #[error(transparent)]
     Broken(#[from] Broken),
-    /// Its outline is no logo.
+    /// The outline is not a valid logo.
     #[error(transparent)]
     Outline(#[from] TargetError),
 }
 
-/// The logo that an SVG shows.
+/// Reads the logo from an SVG.
 ///
 /// # Errors
-/// Where the text is no SVG, has what cannot be printed black, is too large or too intricate, or shows nothing.
+/// Returns an error if the text is not an SVG, contains elements that cannot be printed in black, is too large or too complex,
+/// or shows nothing.
 pub fn from_svg(svg: &str) -> Result<Logo, LogoError> {
     if svg.len() > MAX_LOGO_BYTES {
         return Err(LogoError::Bytes);

@@ -1,4 +1,4 @@
-//! What an SVG paints, in the order in which it does.
+//! The areas that an SVG paints, in painting order.
 
 use i_overlay::core::fill_rule::FillRule;
 use kurbo::{Affine, BezPath, Cap, Join, PathEl, Point, Rect, Shape, StrokeOpts};
@@ -9,19 +9,20 @@ use super::area::{Area, Straight, Tone};
 use super::elements::{named, unnamed};
 use super::{LogoError, crossings};
 
-/// How far straight lines may be from the curves that they replace, in heights of what is black: 1.2 µm of 12 mm.
+/// Maximum distance of straight lines from the curves that they replace, as a fraction of the height of the logo: 1.2 µm of
+/// 12 mm.
 const FLATNESS: f64 = 1e-4;
 
-/// Most corners of all outlines before they become one.
+/// Maximum number of corners of all outlines before their union.
 const MOST_CORNERS: usize = 20_000;
 
-/// Most pairs of lines that meet: the union of all would have as many corners.
+/// Maximum number of crossing lines: their union has a corner at each crossing.
 const MOST_CROSSINGS: usize = 100_000;
 
-/// Most dashes of a stroke.
+/// Maximum number of dashes of a stroke.
 const MOST_DASHES: usize = 2_000;
 
-/// The areas that are painted one after the other.
+/// Returns the painted areas in painting order.
 pub(super) fn of(tree: &Tree) -> Result<Vec<(Tone, Area)>, LogoError> {
     let mut found = Found::default();
     found.group(tree.root(), Affine::IDENTITY, &[])?;
@@ -36,7 +37,7 @@ pub(super) fn of(tree: &Tree) -> Result<Vec<(Tone, Area)>, LogoError> {
             false => Ok(straight),
         }
     };
-    // All is counted before anything is computed of it.
+    // Counts are checked before anything is computed.
     let clips = found.clips.iter().map(|clip| clip.iter().map(&mut straight).collect());
     let clips: Vec<Vec<Straight>> = clips.collect::<Result<_, _>>()?;
     let items = found.items.iter().map(|item| straight(&item.outline));
@@ -55,7 +56,7 @@ pub(super) fn of(tree: &Tree) -> Result<Vec<(Tone, Area)>, LogoError> {
     Ok(painted.collect())
 }
 
-/// The inside of a path, or what a stroke along it covers.
+/// The inside of a path, or the area that its stroke covers.
 struct Outline {
     path: BezPath,
     rule: FillRule,
@@ -63,20 +64,20 @@ struct Outline {
     drawing_from_path: Affine,
 }
 
-/// Something painted.
+/// A painted outline.
 struct Item {
     tone: Tone,
     outline: Outline,
-    /// It is seen within each of these clips.
+    /// The indices of the clips that limit it.
     clips: Vec<usize>,
 }
 
 #[derive(Default)]
 struct Found {
     items: Vec<Item>,
-    /// Of several outlines each.
+    /// Clips of one or more outlines each.
     clips: Vec<Vec<Outline>>,
-    /// A rectangle around all that is black.
+    /// The bounding rectangle of the black outlines.
     black_around: Option<Rect>,
 }
 
@@ -93,14 +94,14 @@ impl Found {
     ) -> Result<(), LogoError> {
         let what = || unnamed(group.id());
         if !group.filters().is_empty() {
-            return refused(format!("{} has a filter", what()), "leave the filter out");
+            return refused(format!("{} has a filter", what()), "remove the filter");
         }
         if group.mask().is_some() {
             return refused(format!("{} has a mask", what()), "cut the paths instead");
         }
         if group.opacity().get() < 1.0 || group.blend_mode() != usvg::BlendMode::Normal {
-            let remedy = "paint it opaque, as there is only black";
-            return refused(format!("{} shines through", what()), remedy);
+            let remedy = "make it opaque, because only black is printed";
+            return refused(format!("{} is transparent", what()), remedy);
         }
         let drawing_from_group = drawing_from_parent * affine(group.transform());
         let mut clips = clips.to_vec();
@@ -165,11 +166,11 @@ impl Found {
     }
 }
 
-/// What is printed of a colour.
+/// The tone of a colour in print.
 fn tone(paint: &Paint, opacity: f32, what: &str) -> Result<Tone, LogoError> {
     if opacity < 1.0 {
-        let remedy = "paint it opaque, as there is only black";
-        return refused(format!("{what} shines through"), remedy);
+        let remedy = "make it opaque, because only black is printed";
+        return refused(format!("{what} is transparent"), remedy);
     }
     match paint {
         Paint::Color(color) if *color == Color::white() => Ok(Tone::White),
@@ -190,7 +191,7 @@ fn rule(fill: &Fill) -> FillRule {
     }
 }
 
-/// How a stroke runs along a path.
+/// The style of a stroke along a path.
 fn style(stroke: &Stroke, path: &BezPath, what: &str) -> Result<kurbo::Stroke, LogoError> {
     let width = f64::from(stroke.width().get());
     let join = match stroke.linejoin() {
@@ -212,18 +213,18 @@ fn style(stroke: &Stroke, path: &BezPath, what: &str) -> Result<kurbo::Stroke, L
     let count = length / period * dashes.len() as f64;
     if count.is_nan() || count > MOST_DASHES as f64 {
         let what = format!("{what} has more than {MOST_DASHES} dashes");
-        return refused(what, "take fewer, or convert strokes to paths");
+        return refused(what, "use fewer, or convert strokes to paths");
     }
     Ok(style.with_dashes(f64::from(stroke.dashoffset()), dashes))
 }
 
-/// The outlines whose inside a clip shows.
+/// The outlines of a clip.
 fn outlines_of_clip(clip: &ClipPath, drawing_from_user: Affine) -> Result<Vec<Outline>, LogoError> {
     let mut outlines = Vec::new();
     let mut groups = vec![(clip.root(), drawing_from_user * affine(clip.transform()))];
     while let Some((group, drawing_from_parent)) = groups.pop() {
         if group.clip_path().is_some() {
-            let what = format!("{} is clipped itself", named("clipPath", clip.id()));
+            let what = format!("{} is itself clipped", named("clipPath", clip.id()));
             return refused(what, "release one of the clips");
         }
         let drawing_from_group = drawing_from_parent * affine(group.transform());
@@ -244,7 +245,7 @@ fn outlines_of_clip(clip: &ClipPath, drawing_from_user: Affine) -> Result<Vec<Ou
 }
 
 impl Outline {
-    /// The same with straight lines for curves, in the drawing.
+    /// The outline in the frame of the drawing, with curves replaced by straight lines.
     fn straight(&self, flatness: f64) -> Straight {
         let scale = self.drawing_from_path.determinant().abs().sqrt();
         let path = match &self.stroke {

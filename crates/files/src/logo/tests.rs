@@ -6,7 +6,7 @@ fn read(body: &str) -> Result<Logo, LogoError> {
     ))
 }
 
-/// The area that is black, of one whose ink is a square of that many units.
+/// The black area of a logo scaled to a height of 100.
 fn black(body: &str) -> f64 {
     let logo = read(body).unwrap_or_else(|error| panic!("{body}: {error}"));
     let place =
@@ -22,24 +22,24 @@ fn signed_area(outline: &[DVec2]) -> f64 {
 }
 
 #[test]
-fn what_is_painted_is_black_and_white_is_paper() {
+fn paint_is_black_and_white_is_paper() {
     let frame = r#"<path d="M0 0H100V100H0Z"/>"#;
     let cases = [
         (frame.to_owned(), 10_000.0),
-        // Painted twice, it is black and no hole.
+        // A shape painted twice is black; it is not a hole.
         (format!(r##"{frame}<circle cx="50" cy="50" r="20" fill="#c00"/>"##), 10_000.0),
         (format!(r##"{frame}<circle cx="50" cy="50" r="20" fill="#fff"/>"##), 10_000.0 - 400.0 * std::f64::consts::PI),
         (format!(r##"<rect width="50" height="100" fill="#fff"/>{frame}"##), 10_000.0),
         (r#"<path fill-rule="evenodd" d="M0 0H100V100H0ZM10 10H90V90H10Z"/>"#.to_owned(), 3_600.0),
         (r#"<path d="M0 0H100V100H0ZM10 10H90V90H10Z"/>"#.to_owned(), 10_000.0),
-        // A stroke is what it covers, dash by dash.
+        // A stroke covers an area for each dash.
         (
             r##"<path fill="none" stroke="#000" stroke-width="50" stroke-dasharray="25 50" d="M0 25H100M0 75H100"/>"##
                 .to_owned(),
             5_000.0,
         ),
         (r##"<path fill="none" stroke="#000" stroke-width="10" d="M5 5H95V95H5Z"/>"##.to_owned(), 3_600.0),
-        // Seen through a clip.
+        // A clip limits the area.
         (format!(r##"<clipPath id="a"><path d="M0 0H50V50H0ZM50 50H100V100H50Z"/></clipPath><g clip-path="url(#a)">{frame}</g>"##), 5_000.0),
         (r##"<defs><g id="a"><path d="M0 0H50V50H0Z"/></g></defs><use xlink:href="#a"/><use href="#a" x="50" y="50"/>"##.to_owned(), 5_000.0),
         (format!(r##"<style>.k{{fill:#fff}}</style>{frame}<rect class="k" y="50" width="50" height="50"/>"##), 7_500.0),
@@ -51,7 +51,7 @@ fn what_is_painted_is_black_and_white_is_paper() {
 }
 
 #[test]
-fn what_cannot_be_printed_is_named() {
+fn unprintable_elements_are_named() {
     let frame = r#"<path id="leaf" d="M0 0H100V100H0Z" "#;
     let gradient = r##"<linearGradient id="g"><stop stop-color="#f00"/><stop offset="1" stop-color="#00f"/></linearGradient>"##;
     let cases = [
@@ -65,19 +65,19 @@ fn what_cannot_be_printed_is_named() {
         ),
         (
             format!(r##"{gradient}{frame}fill="url(#g)"/>"##),
-            "what has the id `leaf` is painted with a gradient",
+            "the element with the id `leaf` is painted with a gradient",
         ),
-        (format!(r#"{frame}fill-opacity="0.5"/>"#), "shines through"),
+        (format!(r#"{frame}fill-opacity="0.5"/>"#), "is transparent"),
         (
             r#"<rect width="9" height="9" opacity="0.5"/>"#.to_owned(),
-            "something in it shines through: paint it opaque",
+            "an element is transparent: make it opaque",
         ),
-        (format!(r#"<g opacity="0.5">{frame}/></g>"#), "shines through"),
+        (format!(r#"<g opacity="0.5">{frame}/></g>"#), "is transparent"),
         (
             format!(
                 r##"<filter id="f"><feGaussianBlur stdDeviation="2"/></filter><g id="h" filter="url(#f)">{frame}/></g>"##
             ),
-            "what has the id `h` has a filter",
+            "the element with the id `h` has a filter",
         ),
         (String::new(), "the logo has no black area"),
         (format!(r#"{frame}fill="white"/>"#), "the logo has no black area"),
@@ -126,7 +126,7 @@ fn files_made_to_exhaust_their_reader_are_refused() {
 }
 
 #[test]
-fn a_changed_file_breaks_nothing() {
+fn altered_files_do_not_crash_the_reader() {
     let good = r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 90 80"><clipPath id="c"><circle cx="40" cy="40" r="39"/></clipPath><g clip-path="url(#c)" transform="rotate(9)"><path d="M10 10C20 0 40 0 50 10L90 80Z" stroke="#123" stroke-width="3" stroke-linejoin="round"/></g><path fill="#fff" d="M20 20h9v9z"/></svg>"##;
     assert!(from_svg(good).is_ok());
     let bytes = b"0919-.eM<>#\"/ zQA";

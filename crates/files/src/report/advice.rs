@@ -93,8 +93,7 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     }
     let mut add = |weight, text: String| found.push(Advice { weight, text });
     if report.estimate.shape.is_some_and(|shape| !shape.is_significant()) {
-        let text =
-            "The estimated shape of the sheet is not significant: calibrate without it.";
+        let text = "The estimated shape of the sheet is not significant: calibrate without it.";
         add(Weight::Hint, text.to_owned());
     }
     if let Some(shape) = report.estimate.shape.filter(|shape| shape.is_significant()) {
@@ -117,7 +116,8 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
         let (test, own) = (held_out.rms_px, report.estimate.rms_px);
         let figures = format!("RMS {test:.4} px on held-out views, {own:.4} px on training views");
         if test > HOLDOUT * own {
-            let text = format!("{figures}: the model overfits, or the held-out views differ in kind.");
+            let text =
+                format!("{figures}: the model overfits, or the held-out views differ in kind.");
             add(Weight::Warning, text);
         } else {
             add(Weight::Good, format!("{figures}."));
@@ -227,8 +227,7 @@ fn views(
         _ => said.misfit_of() == Some(index),
     };
     if !bad.is_empty() && !report.diagnoses.iter().any(is_other) {
-        let bent =
-            if report.has_panels() { "a bent or loose panel" } else { "a bent board" };
+        let bent = if report.has_panels() { "a bent or loose panel" } else { "a bent board" };
         let text = format!(
             "Views with much larger residuals than the others: {}. Check for motion blur, {bent}, or reflections.",
             named(&bad)
@@ -247,8 +246,9 @@ fn left_out(
     let excluded: Vec<&str> = excluded.map(|out| out.view.as_str()).collect();
     if !excluded.is_empty() {
         let names = named(&excluded);
-        let text =
-            format!("Excluded, because they are inconsistent with the other views or the target: {names}.");
+        let text = format!(
+            "Excluded, because they are inconsistent with the other views or the target: {names}."
+        );
         add(Weight::Warning, text);
     }
 }
@@ -381,9 +381,7 @@ fn residuals(report: &Report, index: usize, survey: &Survey, add: &mut impl FnMu
                 ),
             );
         }
-        Some(_) => {
-            add(Weight::Good, "Residuals show no strong pattern over the image.".to_owned())
-        }
+        Some(_) => add(Weight::Good, "Residuals show no strong pattern over the image.".to_owned()),
         None => {}
     }
 }

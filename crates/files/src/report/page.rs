@@ -133,9 +133,7 @@ fn verdict(report: &Report, advice: &[Advice]) -> String {
     };
     let (sign, head, why) = match worst {
         _ if is_failure => ("✕", "Do not use", "The reasons are below.".to_owned()),
-        Weight::Warning => {
-            (own_sign, "Use with care", format!("See {} first.", below("warning")))
-        }
+        Weight::Warning => (own_sign, "Use with care", format!("See {} first.", below("warning"))),
         Weight::Hint => {
             let verb = if of_worst == 1 { "shows" } else { "show" };
             let why = format!("No warnings; {} {verb} how to improve it.", below("hint"));
@@ -177,7 +175,10 @@ fn target(map: &TargetMap) -> String {
     let cells = cells(&[
         (format!("{plane:.3} mm"), "in the plane, rms per axis"),
         (format!("{out:.3} mm"), "out of the plane, rms"),
-        (format!("{} of {}", map.significant().count(), map.corners().len()), "significant offsets"),
+        (
+            format!("{} of {}", map.significant().count(), map.corners().len()),
+            "significant offsets",
+        ),
     ]);
     let svg = target_map::drawing(map, "");
     let body = format!(

@@ -354,7 +354,7 @@ fn boards_of_a_list_without_poses_are_independent() {
         (poses.replace("\n1\n", "\n0\n"), "board 0 has two poses"),
         (
             poses.split("2\n0 0 1").next().unwrap().to_owned() + "2\n1 0 0 5\n0 1 0 0\n0 0 1 0\n",
-            "boards 0 and 2 in the same place",
+            "boards 0 and 2 have the same position",
         ),
     ] {
         std::fs::write(at.join("cube.tp"), wrong).unwrap();

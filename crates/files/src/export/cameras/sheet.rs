@@ -33,9 +33,7 @@ pub enum SheetError {
     )]
     Foreign,
     /// A field is missing or has an invalid value.
-    #[error(
-        "field `{field}`: {problem}; calibrate again with {CalibrationBoardShape}"
-    )]
+    #[error("field `{field}`: {problem}; calibrate again with {CalibrationBoardShape}")]
     Field {
         /// The field, for example `board_shape.reach_mm`.
         field: String,

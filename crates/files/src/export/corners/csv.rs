@@ -1,9 +1,8 @@
-//! Detections as comma-separated values, one corner in each line, for spreadsheets and data frames;
-//! and reading of lists of points.
+//! Detections as comma-separated values, one corner per line, for spreadsheets and data frames; and a reader of lists of points.
 //!
-//! Columns: `grid` (counted from 0 in the image), `kind`, `panel` (`target:panel` when there are
-//! several targets), `row`, `col`, `id`, `x`, `y` (px, pixel centres at integers, y down),
-//! `cov_xx`, `cov_xy`, `cov_yy` (px²), `target` (fingerprint of the target that it belongs to). A cell is empty where the value is not known.
+//! Columns: `grid` (counted from 0 in the image), `kind`, `panel` (`target:panel` with several targets), `row`, `col`, `id`,
+//! `x`, `y` (px, pixel centres at integers, y down), `cov_xx`, `cov_xy`, `cov_yy` (px²), `target` (fingerprint of the target of
+//! the corner). A cell is empty if the value is not known.
 
 use std::fmt::Write;
 
@@ -15,7 +14,7 @@ use deltille_core::lattice::GridKind;
 /// The header line.
 pub const HEADER: &str = "grid,kind,panel,row,col,id,x,y,cov_xx,cov_xy,cov_yy,target";
 
-/// The text of the CSV file of one image.
+/// Returns the text of the CSV file of one image.
 ///
 /// ```
 /// use deltille_core::detection::Detection;
@@ -51,10 +50,10 @@ pub fn write(detection: &Detection) -> String {
     text
 }
 
-/// Reads points, px, one `x,y` in each line; a header line `x,y` and empty lines are skipped.
+/// Reads points, px, one `x,y` per line; a header line `x,y` and empty lines are skipped.
 ///
 /// # Errors
-/// The number of the first line that is not a point.
+/// Returns the number of the first line that is not a point.
 pub fn read_points(text: &str) -> Result<Vec<DVec2>, String> {
     let mut points = Vec::new();
     for (i, line) in text.lines().enumerate() {
@@ -65,7 +64,7 @@ pub fn read_points(text: &str) -> Result<Vec<DVec2>, String> {
             Some(&[x, y]) => points.push(DVec2::new(x, y)),
             _ if line.trim().is_empty() => {}
             _ if i == 0 && fields == ["x", "y"] => {}
-            _ => return Err(format!("line {}: write x,y in px, not {line:?}", i + 1)),
+            _ => return Err(format!("line {}: expected x,y in px, not {line:?}", i + 1)),
         }
     }
     Ok(points)

@@ -16,49 +16,49 @@ use deltille_core::targets::TargetIdentity;
 /// Schema and version that this crate writes and reads.
 pub const SCHEMA: &str = "deltille/detection/1";
 
-/// Why a detection file cannot be read.
+/// Error of reading a detection file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DetectionFileError {
     /// The file is not JSON, or truncated.
-    #[error("not a detection file: {}; make it anew with {DetectionWrite}", in_words(.0))]
+    #[error("not a detection file: {}; make it again with {DetectionWrite}", in_words(.0))]
     Json(serde_json::Error),
     /// The file has another version of the schema.
-    #[error("field `schema` is `{found}`, this version reads `{SCHEMA}`: make the file anew")]
+    #[error("field `schema` is `{found}`, but this version reads `{SCHEMA}`: make the file again")]
     Schema {
         /// The schema that the file names.
         found: String,
     },
     /// The file is not a detection.
-    #[error("this is a {found} file, not a detection: give what {DetectionWrite} made")]
+    #[error("this is a {found} file, not a detection: use a file made by {DetectionWrite}")]
     Kind {
         /// The schema that the file names.
         found: String,
     },
-    /// A field is missing, unknown, or has an invalid value.
-    #[error("field `{field}`: {problem}; make the file anew with {DetectionWrite}")]
+    /// A field is missing or unknown, or has an invalid value.
+    #[error("field `{field}`: {problem}; make the file again with {DetectionWrite}")]
     Field {
-        /// The field, such as `grids[0].corners[3].x`.
+        /// The field, for example `grids[0].corners[3].x`.
         field: String,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
     /// A grid repeats the corners of another one.
-    #[error("grids[{grid}] is grids[{first}] again")]
+    #[error("grids[{grid}] repeats grids[{first}]")]
     Again {
         /// Index of the second.
         grid: usize,
         /// Index of the first.
         first: usize,
     },
-    /// A corner is not valid: its covariance is none, or its label is not unique.
+    /// A corner is not valid: its covariance is not valid, or its label is not unique.
     #[error("grids[{grid}].corners[{corner}]: {problem}")]
     Corner {
         /// Index of the grid.
         grid: usize,
         /// Index of the corner.
         corner: usize,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
 }
@@ -100,7 +100,7 @@ struct DetectionFile {
     timing_ms: BTreeMap<String, f64>,
 }
 
-/// The JSON text of the detection in one image, with one corner in each line; positions in px.
+/// Returns the JSON text of the detection in one image, with one corner per line; positions are in px.
 ///
 /// ```
 /// use deltille_core::detection::Detection;
@@ -114,7 +114,7 @@ pub fn write(detection: &Detection) -> String {
     deltille_core::json::to_text(&DetectionFile::of(detection), 4)
 }
 
-/// The same JSON as a single line with its line end, for streams of detections.
+/// Returns the same JSON as a single line with its line end, for streams of detections.
 pub fn write_line(detection: &Detection) -> String {
     deltille_core::json::to_text(&DetectionFile::of(detection), 0)
 }
@@ -159,7 +159,7 @@ pub fn is_foreign(text: &str) -> bool {
 /// Reads the text of a detection file.
 ///
 /// # Errors
-/// When the text is not a detection, has another version, or a field, corner or grid is not valid.
+/// Returns an error if the text is not a detection, has another version, or contains an invalid field, corner or grid.
 pub fn read(text: &str) -> Result<Detection, DetectionFileError> {
     let found = json::named_schema(text)?;
     if json::kind(&found) != json::kind(SCHEMA) {
@@ -189,7 +189,7 @@ pub fn read(text: &str) -> Result<Detection, DetectionFileError> {
     Ok(detection)
 }
 
-/// Refuses corners that stand twice or whose covariance is none.
+/// Refuses repeated corners, and corners whose covariance is not valid.
 pub(in crate::export) fn check_corners(grids: &[Grid]) -> Result<(), DetectionFileError> {
     // A repeated corner would count twice. A panel may be seen in several grids.
     let (mut places, mut firsts) = (BTreeSet::new(), BTreeMap::new());
@@ -199,7 +199,7 @@ pub(in crate::export) fn check_corners(grids: &[Grid]) -> Result<(), DetectionFi
         if first != grid && !of_grid.corners.is_empty() {
             return Err(DetectionFileError::Again { grid, first });
         }
-        // Without a panel labels are unique within their grid only.
+        // Without a panel, labels are unique only within their grid.
         let labels =
             of_grid.panel.map_or((None, grid), |panel| (Some((&of_grid.target, panel)), 0));
         for (corner, found) in of_grid.corners.iter().enumerate() {
@@ -207,7 +207,7 @@ pub(in crate::export) fn check_corners(grids: &[Grid]) -> Result<(), DetectionFi
                 return Err(DetectionFileError::Corner { grid, corner, problem });
             }
             if !places.insert((labels, found.row, found.col)) {
-                let problem = "another corner has this row and column already".to_owned();
+                let problem = "another corner has the same row and column".to_owned();
                 return Err(DetectionFileError::Corner { grid, corner, problem });
             }
         }
@@ -221,7 +221,7 @@ fn check_covariance([xx, xy, yy]: [f64; 3]) -> Result<(), String> {
         let in_range = quantity::variance_px2::RANGE.check(variance);
         in_range.map_err(|what| format!("`cov`: a variance, {what}"))?;
     }
-    // Written so that NaN is refused, too.
+    // This comparison also refuses NaN.
     let usable = xx * yy > xy * xy;
-    usable.then_some(()).ok_or_else(|| "`cov` is no covariance xx, xy, yy".to_owned())
+    usable.then_some(()).ok_or_else(|| "`cov` is not a valid covariance xx, xy, yy".to_owned())
 }

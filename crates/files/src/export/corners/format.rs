@@ -1,4 +1,4 @@
-//! The formats of detections: each is a line of a table, and a writer beside it.
+//! The formats of detections: each has a line in a table and a writer in this folder.
 
 use super::{csv, detection, orpc};
 use crate::export::named::Format;
@@ -9,23 +9,23 @@ use deltille_core::targets::Target;
 /// A format of detections.
 #[derive(Clone, Copy)]
 pub struct DetectionFormat {
-    /// What it is asked for by, and the extension of its files.
+    /// The name that selects the format, and the extension of its files.
     name: &'static str,
     help: &'static str,
     kind: fn() -> Kind,
     text: Option<Text>,
-    /// Whether corners of one target only have a place in it.
+    /// Whether it can contain corners of one target only.
     pub is_of_one_target: bool,
 }
 
-/// What writes a detection; the target is the one that was looked for.
+/// Writer of a detection; the target is the one that was searched for.
 type Text = fn(&Detection, Option<&Target>) -> String;
 
 /// The formats.
 pub const DETECTION_FORMATS: &[DetectionFormat] = &[
     DetectionFormat {
         name: "json",
-        help: "Everything, one file per image",
+        help: "All results, one file per image",
         kind: || Kind::of_schema(detection::SCHEMA),
         text: Some(|found, _| detection::write(found)),
         is_of_one_target: false,
@@ -39,14 +39,14 @@ pub const DETECTION_FORMATS: &[DetectionFormat] = &[
     },
     DetectionFormat {
         name: "csv",
-        help: "One corner a line, with a header",
+        help: "One corner per line, with a header",
         kind: || Kind::of(csv::HEADER.as_bytes()),
         text: Some(|found, _| csv::write(found)),
         is_of_one_target: false,
     },
     DetectionFormat {
         name: "parquet",
-        help: "corners.parquet and pictures.parquet, a row for each corner and for each image of the run; `calibrate` \
+        help: "corners.parquet and pictures.parquet, with a row for each corner and for each image of the run; `calibrate` \
                and `rig` read them",
         kind: Kind::own_parquet,
         text: None,
@@ -60,12 +60,12 @@ impl DetectionFormat {
         (self.kind)()
     }
 
-    /// Whether each image has a file of its own; a table has rows for all.
+    /// Whether each image has its own file; a table has rows for all images.
     pub fn is_of_one_image(&self) -> bool {
         self.text.is_some()
     }
 
-    /// The text of an image's file; a table has none.
+    /// Returns the text of an image's file; `None` for tables.
     pub fn text(&self, found: &Detection, target: Option<&Target>) -> Option<String> {
         self.text.map(|text| text(found, target))
     }

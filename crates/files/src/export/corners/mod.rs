@@ -1,7 +1,7 @@
-//! What was found in photographs, and lists of boards.
+//! Detections in photographs, and lists of boards.
 //!
-//! [`detection`] is the JSON of a detection, [`csv`], [`orpc`] and `tables` have the same for others; `format` lists them.
-//! `overlay` shows it over the photograph; [`dsc`] and [`tp`] list boards and their poses, [`npy`] arrays.
+//! [`detection`] is the JSON of a detection; [`csv`], [`orpc`] and `tables` are for other programs, and `format` lists all of
+//! them. `overlay` draws a detection over the photograph. [`dsc`] and [`tp`] contain boards and their poses, [`npy`] arrays.
 
 pub mod csv;
 pub mod detection;

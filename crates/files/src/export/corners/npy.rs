@@ -3,15 +3,15 @@
 /// The first bytes of a file.
 pub const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// The bytes of an array of float32 with shape (rows, columns), little-endian, row by row; `values`
-/// has to yield rows · columns numbers.
+/// Returns the bytes of an array of float32 with shape (rows, columns), little-endian, row by row; `values`
+/// must yield rows · columns numbers.
 pub fn float32(rows: usize, columns: usize, values: impl Iterator<Item = f32>) -> Vec<u8> {
-    /// Data begin at a multiple of this.
+    /// Alignment of the data, bytes.
     const ALIGNED: usize = 64;
     let shape = format!("({rows}, {columns})");
     let mut head = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}");
     let before = MAGIC.len() + 4;
-    // A line end closes the head.
+    // A line end closes the header.
     let blanks = (ALIGNED - (before + head.len() + 1) % ALIGNED) % ALIGNED;
     head.extend(std::iter::repeat_n(' ', blanks));
     head.push('\n');

@@ -1,5 +1,4 @@
-//! `.orpc` corner lists, as the reference detector writes them (`docs/formats.md`, “.orpc corner
-//! lists”).
+//! `.orpc` corner lists in the format of the reference detector (`docs/formats.md`, “.orpc corner lists”).
 //!
 //! ```text
 //! filename: photo.png
@@ -10,10 +9,9 @@
 //! 0,4,1,612.0313,804.774          board, point, ordered, x, y; pixel centres at integers
 //! ```
 //!
-//! `board` is the position of the board among those of the target by ascending id, `point` the
-//! index of the corner in its matrix ([`super::dsc::point_id`]). After the corners, where readers have stopped that count
-//! them, a comment names the target that was looked for. A grid that is not labelled has
-//! board −1, ordered 0, and points counted in the smallest matrix that holds the grid.
+//! `board` is the index of the board among those of the target by ascending id; `point` is the index of the corner in its matrix
+//! ([`super::dsc::point_id`]). A comment after the corners names the target that was searched for; readers that count corners do
+//! not reach it. An unlabelled grid has board −1, ordered 0, and points counted in the smallest matrix that contains the grid.
 
 use std::fmt::Write;
 
@@ -25,7 +23,7 @@ use deltille_core::targets::Target;
 /// The first word of a file.
 pub const HEAD: &str = "filename:";
 
-/// The text of the `.orpc` file of one image; `target` is the target that was looked for, if known.
+/// Returns the text of the `.orpc` file of one image; `target` is the target that was searched for, if known.
 /// Positions are in px.
 pub fn write(detection: &Detection, target: Option<&Target>) -> String {
     let lines: Vec<String> =

@@ -1,9 +1,8 @@
-//! Overlay: the photograph with its detection drawn in.
+//! Overlay: the photograph with its detection drawn on it.
 //!
-//! Edges of grids are lines, corners are rings around the unmarked point, with corner ids beside
-//! them (or row and column in an unlabelled grid) and tag ids in their tiles. Every grid has its
-//! own colour. Line widths and text scale with the size of the tiles, and a small photograph is
-//! enlarged, so that all text is legible.
+//! Edges of grids are lines, and corners are rings around the unmarked point. Corner ids (or row and column in an unlabelled
+//! grid) are beside the corners, tag ids in their tiles. Every grid has its own colour. Line widths and text scale with the size
+//! of the tiles, and a small photograph is enlarged, so all text is legible.
 
 use glam::DVec2;
 use tiny_skia::{
@@ -21,35 +20,34 @@ use deltille_layout::artwork::text;
 const COLOURS: [[u8; 3]; 6] =
     [[255, 80, 60], [60, 170, 255], [80, 220, 80], [255, 180, 0], [230, 90, 255], [0, 220, 210]];
 
-/// Least length of a tile edge in the picture, px, as far as enlarging allows: ids of three digits
-/// then stay legible beside their corners.
+/// Minimum length of a tile edge in the overlay, px, if enlarging allows it: ids of three digits are then
+/// legible beside their corners.
 const READABLE_EDGE_PX: f64 = 52.0;
-/// Greatest enlargement of a photograph, and the longest side that it may reach, px.
+/// Maximum enlargement of a photograph, and the maximum side length after it, px.
 const MOST_ENLARGED: u32 = 8;
 const LARGEST_SIDE_PX: u32 = 4096;
-/// Text height, line width and ring radius in tile edges.
+/// Text height, line width and ring radius as fractions of the tile edge.
 const TEXT_EDGES: f64 = 0.17;
 const TAG_TEXT_EDGES: f64 = 0.3;
 const LINE_EDGES: f64 = 0.03;
 const RING_EDGES: f64 = 0.09;
 
-/// Why an overlay cannot be made.
+/// Error of making an overlay.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OverlayError {
-    /// The picture is too large for memory.
+    /// The image is too large for memory.
     #[error("an image of {0} × {1} pixels is too large to draw on")]
     TooLarge(u32, u32),
     /// The PNG encoder failed.
-    #[error("the picture cannot be encoded: {0}")]
+    #[error("the overlay cannot be encoded: {0}")]
     Encode(String),
 }
 
-/// The PNG file of a photograph with its detection drawn in. `detection` has positions in px of
-/// `image`.
+/// Returns the PNG file of a photograph with its detection drawn on it. `detection` has positions in px of `image`.
 ///
 /// # Errors
-/// When the picture is too large to draw on, or cannot be encoded.
+/// Returns an error if the image is too large to draw on, or if it cannot be encoded.
 pub fn png(image: &AnyGray, detection: &Detection) -> Result<Vec<u8>, OverlayError> {
     let scale = enlargement(image.width() as u32, image.height() as u32, detection);
     let mut canvas = match image {
@@ -64,8 +62,8 @@ pub fn png(image: &AnyGray, detection: &Detection) -> Result<Vec<u8>, OverlayErr
     Ok(signed_png(png))
 }
 
-/// The PNG file of an image of a size, px, black where no photograph is given, with outlines and places drawn in by lines
-/// so wide, px.
+/// Returns the PNG file of an image of a given size, px, with outlines and points in lines of a given width, px. The background
+/// is black without a photograph.
 pub(in crate::export) fn outlined(
     image: Option<&AnyGray>,
     [width, height]: [u32; 2],
@@ -88,7 +86,7 @@ pub(in crate::export) fn outlined(
     Ok(signed_png(png))
 }
 
-/// Polygons, filled faintly, a line of twice their outlines' width, and dots, px.
+/// Faintly filled polygons, a line of twice the width of their outlines, and dots, px.
 pub(in crate::export) struct Outlined<'a> {
     pub polygons: &'a [Vec<DVec2>],
     pub line: Vec<DVec2>,
@@ -239,11 +237,10 @@ fn stroke(canvas: &mut Pixmap, path: Option<Path>, colour: Color, width: f64) {
     canvas.stroke_path(&path, &solid(colour), &stroke, Transform::identity(), None);
 }
 
-/// Writes text with a dark outline, so that it is legible on black, white and grey; from its lower
-/// left corner, or centred.
+/// Draws text from its lower left corner, or centred. A dark outline makes it legible on black, white and grey.
 fn write(canvas: &mut Pixmap, words: &str, at: DVec2, size: f64, centred: bool, colour: Color) {
     let size = size.clamp(7.0, 160.0);
-    // Digits, commas and minus signs, which the font has.
+    // The font contains digits, commas and minus signs.
     let Ok((outline, width)) = text::outline(words, size) else { return };
     let DVec2 { mut x, mut y } = at;
     if centred {

@@ -1,4 +1,4 @@
-//! Reader of `.tp` board poses, which lie beside a `.dsc` whose boards are each in a plane of their own.
+//! Reader of `.tp` board poses, which belong to a `.dsc` whose boards are each given in their own plane.
 //!
 //! ```text
 //! # a comment line
@@ -15,10 +15,10 @@ use deltille_core::targets::{PanelPose, Target};
 use deltille_core::words::quoted;
 use glam::{DMat3, DVec3};
 
-/// The rows of a rotation are of length 1 and at right angles to this; they are written with six digits at least.
+/// Tolerance of the orthonormality of a rotation; files have at least six digits.
 const ORTHONORMAL: f64 = 1e-3;
 
-/// Why a `.tp` cannot be used.
+/// Error of using a `.tp`.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TpError {
@@ -27,21 +27,21 @@ pub enum TpError {
     Line {
         /// Counted from 1.
         line: usize,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
     /// A board without a pose.
-    #[error("board {0} of the .dsc has no pose in it")]
+    #[error("board {0} of the .dsc has no pose in this file")]
     NoPose(u32),
-    /// Two boards in one place.
-    #[error("it puts boards {} and {} in the same place", .0[0], .0[1])]
+    /// Two boards in the same position.
+    #[error("boards {} and {} have the same position", .0[0], .0[1])]
     Overlap([u32; 2]),
 }
 
-/// The poses target_from_board of a text, by the board's id.
+/// Reads the poses target_from_board with the ids of their boards.
 ///
 /// # Errors
-/// When a line is not valid.
+/// Returns an error if a line is not valid.
 pub fn read(text: &str) -> Result<Vec<(u32, PanelPose)>, TpError> {
     let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
     let mut lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
@@ -49,19 +49,22 @@ pub fn read(text: &str) -> Result<Vec<(u32, PanelPose)>, TpError> {
     while let Some((line, id)) = lines.next() {
         let fault = |line: usize, problem: String| TpError::Line { line, problem };
         let id = id.parse::<u32>();
-        let id = id.map_err(|_| fault(line, "a board's id is expected".to_owned()))?;
+        let id = id.map_err(|_| fault(line, "expected the id of a board".to_owned()))?;
         if found.iter().any(|(other, _)| *other == id) {
             return Err(fault(line, format!("board {id} has two poses")));
         }
         let (mut rows, mut translation_mm) = ([DVec3::ZERO; 3], DVec3::ZERO);
         for row in 0..3 {
-            let (at, text) = lines
-                .next()
-                .ok_or_else(|| fault(line, format!("three lines of board {id} must follow")))?;
+            let (at, text) = lines.next().ok_or_else(|| {
+                fault(line, format!("expected three lines of board {id} after its id"))
+            })?;
             let numbers: Option<Vec<f64>> =
                 text.split_whitespace().map(|number| number.parse().ok()).collect();
             let Some(&[a, b, c, t]) = numbers.as_deref() else {
-                let problem = format!("{} is not four numbers, a row of R and t", quoted(text));
+                let problem = format!(
+                    "expected four numbers (a row of R and an entry of t), not {}",
+                    quoted(text)
+                );
                 return Err(fault(at, problem));
             };
             rows[row] = DVec3::new(a, b, c);
@@ -71,7 +74,7 @@ pub fn read(text: &str) -> Result<Vec<(u32, PanelPose)>, TpError> {
         let rotation = DMat3::from_cols_array_2d(&rows.map(|row| row.to_array())).transpose();
         let off = rotation * rotation.transpose() - DMat3::IDENTITY;
         let off = off.to_cols_array().into_iter().fold(0.0, |most: f64, v| most.max(v.abs()));
-        // Of what is not a number neither holds.
+        // Both comparisons are false for NaN.
         if !(off < ORTHONORMAL && rotation.determinant() > 0.0) {
             return Err(fault(line, format!("R of board {id} is not a rotation")));
         }
@@ -81,11 +84,11 @@ pub fn read(text: &str) -> Result<Vec<(u32, PanelPose)>, TpError> {
     Ok(found)
 }
 
-/// A target whose boards are each in a plane of their own, with its boards where a text has them. What the text has of
-/// other boards is passed over.
+/// Returns a target whose boards are each given in their own plane, with its boards at the poses of a text. Poses of other
+/// boards are ignored.
 ///
 /// # Errors
-/// When the text is not valid, lacks a board, or puts two in the same place.
+/// Returns an error if the text is not valid, lacks a board, or gives two boards the same position.
 pub fn placed(target: &Target, text: &str) -> Result<Target, TpError> {
     let poses = read(text)?;
     let of_panel = |panel: &deltille_core::targets::Panel| {

@@ -10,7 +10,7 @@ use super::mesh::TexturedMesh;
 use super::obj::{material_name, numbered};
 use crate::export::writing::atomic;
 
-/// Component type `f32`. Like the constants below, a number of the glTF 2.0 specification.
+/// Component type `f32`. This and the constants below are numbers of the glTF 2.0 specification.
 pub const FLOAT: u32 = 5126;
 /// Component type `u16`.
 pub const UNSIGNED_SHORT: u32 = 5123;
@@ -22,21 +22,20 @@ pub const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 pub const LINEAR: u32 = 9729;
 /// Texture filter: linear, also between mipmaps.
 pub const LINEAR_MIPMAP_LINEAR: u32 = 9987;
-/// Texture wrapping: the outermost texels are repeated.
+/// Texture wrapping: repeats the outermost texels.
 pub const CLAMP_TO_EDGE: u32 = 33071;
 
 /// Writes the mesh as a `.glb` file.
 ///
 /// # Errors
-/// When the file cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn write(mesh: &TexturedMesh, path: &Path) -> Result<(), atomic::WriteError> {
     let bytes = to_bytes(mesh);
     atomic::write(path, |file| file.write_all(&bytes))
 }
 
-/// The bytes of the mesh as a `.glb` file: for each texture a list of triangles and a material. Faces do not share
-/// vertices, so that normals are exact. Indices have 16 bits, which suffice for the 20 000 triangles that a solid may
-/// have.
+/// Returns the bytes of the mesh as a `.glb` file, with a list of triangles and a material for each texture. Faces do not share
+/// vertices, so normals are exact. Indices have 16 bits, enough for the maximum of 20 000 triangles.
 pub fn to_bytes(mesh: &TexturedMesh) -> Vec<u8> {
     let count = mesh.textures.len();
     let mut binary = Binary::default();
@@ -91,7 +90,7 @@ pub fn to_bytes(mesh: &TexturedMesh) -> Vec<u8> {
     glb.to_vec().expect("a texture within its limits fits into a file")
 }
 
-/// Name of the picture of a texture, counted from 0, of a target of this name, among so many.
+/// Name of the image of one of `count` textures, counted from 0, of a target with this name.
 pub fn image_name(name: &str, texture: usize, count: usize) -> String {
     numbered(name.to_owned(), "-texture-", texture, count)
 }
@@ -104,7 +103,7 @@ struct Binary {
 }
 
 impl Binary {
-    /// Adds bytes and returns the number of their view.
+    /// Adds bytes and returns the index of their view.
     fn view(&mut self, bytes: Vec<u8>, target: Option<u32>) -> usize {
         let mut view =
             json!({"buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len()});

@@ -1,5 +1,5 @@
-//! A target as two bodies, one inlaid into the other: what is dark, as deep as is asked for and flush with the surface, and
-//! the plate or solid without it.
+//! A target as two bodies, one inlaid into the other: the dark parts, with the requested depth and flush with the surface, and the
+//! rest of the plate or solid.
 //!
 //! ```text
 //!        black   black            Each face is cut into triangles of one colour. The dark ones are
@@ -22,10 +22,10 @@ use deltille_core::polygon::rectangle;
 use deltille_core::targets::{Panel, Polyhedron, Target, TargetSpec};
 use deltille_layout::artwork::{Part, Shape, panel_shapes, subject};
 
-/// Points that are nearer than this are one, mm: the same corner, computed in two ways.
+/// Distance below which two points are the same corner computed in two ways, mm.
 const SAME_MM: f64 = 1e-6;
 
-/// How far a polygon may be from the curve that it stands for, mm.
+/// Maximum distance of a polygon from the curve that it replaces, mm.
 const CURVE_MM: f64 = 0.002;
 
 /// A closed body, mm.
@@ -44,27 +44,27 @@ impl Body {
     }
 }
 
-/// A white and a black body that fill a plate or a solid together.
+/// A white and a black body that together fill a plate or a solid.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct InlaidBodies {
     /// Name of the target.
     pub name: String,
-    /// One line on what it is.
+    /// One-line description of the target.
     pub subject: String,
-    /// All that is not black.
+    /// The body without the black parts.
     pub white: Body,
-    /// What is dark in the drawing, flush with the surface.
+    /// The dark parts of the drawing, flush with the surface.
     pub black: Body,
 }
 
 impl InlaidBodies {
-    /// Makes the bodies of a solid without dents, or of a plate with a board, its quiet zone around it, whose front is the
-    /// board's plane.
+    /// Makes the bodies of a convex solid, or of a plate with a board and its quiet zone. The front of the plate is the plane of
+    /// the board.
     ///
     /// # Errors
-    /// When the target is neither, or is several boards, the family of its tags is unknown, or the inlay is as deep as the plate is
-    /// thick, or so deep that those of two faces meet.
+    /// Returns an error if the target is neither, or has several boards, if the family of its tags is unknown, or if the inlay
+    /// reaches through the plate or meets the inlay of another face.
     pub fn new(target: &Target, meshing: Meshing) -> Result<Self, MeshError> {
         let name = target.name.to_string();
         if meshing.inlay_mm.is_nan() || meshing.inlay_mm < LEAST_INLAY_MM {
@@ -145,44 +145,44 @@ fn solid(target: &Target, solid: &Polyhedron, inlay_mm: f64) -> Result<[Body; 2]
     }
 }
 
-/// How deep an inlay may be in a place on a face, mm, so that it stays nearer to that face than to any other, and meets no
-/// other inlay.
+/// Maximum depth of an inlay at a position on a face, mm. It stays nearer to this face than to any other, so it meets no other
+/// inlay.
 fn deepest(place: DVec3, planes: &[(DVec3, DVec3)], face: usize) -> f64 {
     let inwards = planes[face].0;
     let others = planes.iter().enumerate().filter(|&(other, _)| other != face);
     let depths = others.map(|(_, &(normal, at))| {
         let away = 1.0 - inwards.dot(normal);
-        // A face in the same plane is beside it all the way down.
+        // A face in the same plane does not limit the depth.
         if away < 1e-9 { f64::INFINITY } else { normal.dot(at - place) / away }
     });
     depths.fold(f64::INFINITY, f64::min)
 }
 
-/// The place behind a point of the surface of a panel, in the target frame.
+/// The position behind a point of the surface of a panel, in the target frame.
 fn below(panel: &Panel, point: DVec2, depth_mm: f64) -> DVec3 {
     panel.pose.target_from_panel(point) - depth_mm * panel.pose.matrix().z_axis
 }
 
-/// The two triangles of a wall, seen from the left of its upper edge where that runs away from the viewer; `lower` are
-/// the vertices below its ends.
+/// The two triangles of a wall below the edge `from` – `to`, facing the left of that edge; `below_from` and `below_to` are the
+/// vertices below its ends.
 fn wall([from, to]: [usize; 2], [below_from, below_to]: [usize; 2]) -> [[usize; 3]; 2] {
     [[from, to, below_to], [from, below_to, below_from]]
 }
 
-/// A face as triangles of one colour each.
+/// A face divided into triangles of one colour each.
 struct Face {
     /// Corners of the outline, then those of the drawing, in the frame of the panel, mm.
     points: Vec<DVec2>,
     /// Counter-clockwise.
     triangles: Vec<[usize; 3]>,
-    /// Which of the triangles are dark.
+    /// Whether each triangle is dark.
     is_dark: Vec<bool>,
-    /// For each directed edge the triangle on its left.
+    /// For each directed edge, the triangle on its left.
     left_of: BTreeMap<[usize; 2], usize>,
 }
 
 impl Face {
-    /// Cuts a convex outline, which runs counter-clockwise, along the edges of what is drawn in it.
+    /// Cuts a convex, counter-clockwise outline along the edges of the drawing in it.
     fn new(outline: &[DVec2], shapes: &[Shape]) -> Result<Self, MeshError> {
         let mut points = Points::default();
         let rim: Vec<usize> = outline.iter().map(|&point| points.index_of(point)).collect();
@@ -190,7 +190,7 @@ impl Face {
             .iter()
             .flat_map(|shape| {
                 let mut loops = loops(shape.path.elements());
-                // The field of an inverted board is all that is there, to the last bit.
+                // The field of an inverted board fills the outline exactly.
                 if let (Part::Field { .. }, Some(field)) = (shape.part, loops.first_mut())
                     && field.iter().zip(outline).all(|(p, q)| p.distance(*q) < SAME_MM)
                 {
@@ -200,7 +200,7 @@ impl Face {
             })
             .map(|corners| corners.into_iter().map(|corner| points.index_of(corner)).collect())
             .collect();
-        // By the even-odd rule: the colour changes across an edge that is there an odd number of times.
+        // Even-odd rule: the colour changes across an edge that occurs an odd number of times.
         let mut edges = BTreeMap::<[usize; 2], bool>::new();
         for corners in &loops {
             for (i, &from) in corners.iter().enumerate() {
@@ -250,20 +250,20 @@ impl Face {
         Ok(Self { points: places, triangles, is_dark, left_of })
     }
 
-    /// The corners of what is dark.
+    /// The corners of the dark triangles.
     fn dark_points(&self) -> impl Iterator<Item = DVec2> {
         let dark = self.triangles.iter().zip(&self.is_dark).filter(|(_, is_dark)| **is_dark);
         dark.flat_map(|(triangle, _)| triangle.map(|point| self.points[point]))
     }
 
-    /// Whether the outline is dark; all of it is of one colour.
+    /// Whether the outline is dark; it has one colour.
     fn is_rim_dark(&self) -> bool {
         self.left_of.get(&[0, 1]).is_some_and(|&index| self.is_dark[index])
     }
 
-    /// Adds the surface of the face to the white body, with a pocket for what is dark, and that to the black one.
-    /// `rim` are the vertices of the white body in the corners of the outline, at the depth of what is there, and `place`
-    /// the place of a point so deep below the face.
+    /// Adds the surface of the face, with pockets for the dark parts, to the white body, and the dark parts to the black body.
+    /// `rim` contains the vertices of the white body at the corners of the outline, at their depth. `place` returns the position
+    /// of a point at a depth below the face.
     fn inlay(
         &self,
         white: &mut Body,
@@ -273,7 +273,7 @@ impl Face {
         place: impl Fn(DVec2, f64) -> DVec3,
     ) {
         let fans = self.dark_fans();
-        // For each fan of dark triangles around a point: the vertices of the black body above and below, and that on
+        // For each fan of dark triangles around a point: the upper and lower vertex of the black body, and the vertex on
         // the floor of the pocket.
         let mut of_fan = BTreeMap::new();
         let mut of_point = BTreeMap::new();
@@ -318,8 +318,8 @@ impl Face {
         }
     }
 
-    /// For each corner of each triangle, three times its index and that of the corner, the least of those of the dark
-    /// triangles around the same point that hang together by edges with it.
+    /// The fan of each corner of each triangle. A fan consists of the dark triangles around a point that are connected by edges; its
+    /// number is the smallest value of 3 · triangle + corner in it.
     fn dark_fans(&self) -> Vec<usize> {
         let mut fans: Vec<usize> = (0..3 * self.triangles.len()).collect();
         fn root(fans: &[usize], mut of: usize) -> usize {
@@ -350,7 +350,7 @@ fn edges_of([a, b, c]: [usize; 3]) -> [[usize; 2]; 3] {
     [[a, b], [b, c], [c, a]]
 }
 
-/// Different points, by their indices.
+/// Distinct points with their indices.
 #[derive(Default)]
 struct Points {
     places: Vec<DVec2>,
@@ -358,7 +358,7 @@ struct Points {
 }
 
 impl Points {
-    /// The index of a point, which is added unless it is there.
+    /// Returns the index of a point, and adds the point if it is new.
     fn index_of(&mut self, point: DVec2) -> usize {
         let near = self.tree.nearest_neighbor(point.to_array()).map(|near| near.data);
         if let Some(index) = near.filter(|&index| self.places[index].distance(point) < SAME_MM) {
@@ -370,7 +370,7 @@ impl Points {
         index
     }
 
-    /// The parts of an edge between the points that lie on it.
+    /// The parts of an edge between the points on it.
     fn parts(&self, from: usize, to: usize) -> Vec<[usize; 2]> {
         let (start, end) = (self.places[from], self.places[to]);
         let along = (end - start).normalize_or_zero();
@@ -388,7 +388,7 @@ impl Points {
     }
 }
 
-/// The closed loops of a path, curves as straight lines within [`CURVE_MM`] of them.
+/// The closed loops of a path, with curves replaced by straight lines within [`CURVE_MM`].
 fn loops(path: &[PathEl]) -> Vec<Vec<DVec2>> {
     let mut loops: Vec<Vec<DVec2>> = Vec::new();
     kurbo::flatten(path.iter().copied(), CURVE_MM, |element| match element {
@@ -400,7 +400,7 @@ fn loops(path: &[PathEl]) -> Vec<Vec<DVec2>> {
         }
         _ => {}
     });
-    // A curve that closes itself ends where it began.
+    // A closed curve ends at its start.
     for corners in &mut loops {
         if let [first, .., last] = corners[..]
             && first.distance(last) < SAME_MM

@@ -1,4 +1,4 @@
-//! The textured mesh of a solid, or of a plate with a board, from which glTF, OBJ and scenes for simulators are written.
+//! The textured mesh of a solid, or of a plate with a board: the source of glTF, OBJ and scenes for simulators.
 
 use glam::{DVec2, DVec3};
 
@@ -14,15 +14,15 @@ use deltille_core::lattice::GridKind;
 use deltille_core::polygon::rectangle;
 use deltille_core::targets::{Panel, SolidSpec, Target, TargetError, TargetSpec, triangles};
 
-/// Cells along the edge of a tile without a tag, as if it had a small one: what is said of them speaks of eighths.
+/// Cells along the edge of a tile without a tag, as if it had a small tag; messages call them eighths of a tile.
 pub const UNTAGGED_CELLS: f64 = 8.0;
 
 const TAGS_TOO_FINE: &str =
-    "its tags would be unsharp in a smaller one; take fewer tiles, or a family of fewer bits";
+    "its tags would be blurred in a smaller texture; use fewer tiles, or a family with fewer bits";
 
-const TILES_TOO_FINE: &str = "its tiles would be unsharp in a smaller one; take fewer";
+const TILES_TOO_FINE: &str = "its tiles would be blurred in a smaller texture; use fewer tiles";
 
-/// Triangles of a plate: the front in two, and as many for each of the other five sides.
+/// Number of triangles of a plate: two for each of its six sides.
 pub const PLATE_TRIANGLES: usize = 12;
 
 /// Specification and family of a target as JSON, for the metadata of its mesh.
@@ -42,11 +42,11 @@ pub struct TexturedMesh {
     /// Name of the target.
     pub name: String,
     /// The triangles: those of the faces of a solid in the order of its panels, or those of a plate, the front first.
-    /// Those of a texture follow each other.
+    /// The triangles of a texture are consecutive.
     pub faces: Vec<MeshFace>,
     /// The textures, all of the same resolution.
     pub textures: Vec<Texture>,
-    /// Texels along the edge of the smallest cell of a tag; `None` where there are no tags.
+    /// Texels along the edge of the smallest cell of a tag; `None` without tags.
     pub texels_per_bit: Option<f64>,
     /// Specification and family of the target, for the metadata of the file.
     pub extras: serde_json::Value,
@@ -70,13 +70,13 @@ pub struct MeshFace {
     pub vertices_mm: [DVec3; 3],
     /// Unit normal, pointing outwards.
     pub normal: DVec3,
-    /// Texture coordinates: (0,0) is the upper left corner of the picture, (1,1) the lower right.
+    /// Texture coordinates: (0,0) is the upper left corner of the texture, (1,1) the lower right.
     pub uv: [DVec2; 3],
-    /// Which texture they are of.
+    /// Index of the texture.
     pub texture: usize,
 }
 
-/// Where a triangle is on a texture.
+/// Position of a triangle on a texture.
 #[derive(Clone, Copy)]
 struct Textured {
     uv: [DVec2; 3],
@@ -90,7 +90,7 @@ impl MeshFace {
     }
 }
 
-/// What has the shape of a mesh.
+/// The shape of a mesh.
 #[derive(Clone, Copy)]
 enum Shape<'a> {
     Solid(&'a SolidSpec),
@@ -99,11 +99,11 @@ enum Shape<'a> {
 }
 
 impl TexturedMesh {
-    /// Makes the mesh of a solid, or of a plate with a board, its quiet zone around it, whose front is the board's plane.
+    /// Makes the mesh of a solid, or of a plate with a board and its quiet zone. The front of the plate is the plane of the board.
     ///
     /// # Errors
-    /// When the target is neither, or is several boards, the family of its tags is unknown, or the texture would be too large, or
-    /// too coarse for the tags.
+    /// Returns an error if the target is neither, or has several boards, if the family of its tags is unknown, or if the texture
+    /// would be too large, or too coarse for the tags.
     pub fn new(target: &Target, meshing: Meshing) -> Result<Self, MeshError> {
         let name = || target.name.to_string();
         let shape = match (&target.spec, target.panels.as_slice()) {
@@ -171,7 +171,7 @@ impl TexturedMesh {
     }
 }
 
-/// Edge of the smallest cell of a tag, mm, or what would be one.
+/// Edge of the smallest cell of a tag, mm, or of the equivalent part of a tile without a tag.
 fn smallest_cell_mm(target: &Target, family: Option<&Family>) -> f64 {
     let of_panel = |panel: &Panel| family.and_then(|family| family.of_tiling(panel.kind));
     let cells = |panel: &Panel| match (of_panel(panel), panel.border_bits) {
@@ -182,7 +182,7 @@ fn smallest_cell_mm(target: &Target, family: Option<&Family>) -> f64 {
     edges.fold(f64::INFINITY, f64::min)
 }
 
-/// The triangles of a plate: sides with boards with their texture, others in the colour of the border of the last.
+/// The triangles of a plate: sides with boards have their texture, other sides the blank border of the last texture.
 fn plate_faces(
     sides: &[Panel],
     thickness_mm: f64,
@@ -193,7 +193,7 @@ fn plate_faces(
     let before = around.map(|corner| sides[0].pose.target_from_panel(corner));
     let behind = before.map(|place| place - thickness_mm * sides[0].pose.matrix().z_axis);
     let [a, b, c, d] = behind;
-    // Lower left end first, as the board on that side is seen.
+    // The lower left corner, as seen from that side, is first.
     let back = [b, a, d, c];
     let last = textures.len() - 1;
     let white = DVec2::splat(BLANK_PX) / DVec2::from(textures[last].size_px.map(f64::from));
@@ -212,5 +212,5 @@ fn plate_faces(
         .collect()
 }
 
-/// A place in the blank border of a texture, px from its corner.
+/// A position in the blank border of a texture, px from its corner.
 const BLANK_PX: f64 = 2.0;

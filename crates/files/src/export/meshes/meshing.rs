@@ -1,4 +1,4 @@
-//! How a mesh is made, and why there is none.
+//! Settings and errors of meshes.
 
 use std::io;
 
@@ -6,66 +6,65 @@ use deltille_core::targets::{ClosedMeshError, TargetError};
 use deltille_core::words::counted;
 use deltille_layout::artwork::ArtworkError;
 
-/// Depth of the inlay, mm, unless another is asked for: two layers of most printers.
+/// Default depth of the inlay, mm: two layers of most printers.
 pub const INLAY_MM: f64 = 0.4;
 
-/// Thinnest inlay, mm: thinner ones are no layer of any printer.
+/// Minimum depth of an inlay, mm: no printer has thinner layers.
 pub const LEAST_INLAY_MM: f64 = 0.05;
 
-/// Texels along the edge of a cell of a tag, unless another resolution is asked for, so that a viewer sees it sharp at
-/// close range.
+/// Default number of texels along the edge of a cell of a tag, which is sharp in a close view.
 pub const TEXELS_PER_BIT: f64 = 20.0;
 
-/// Longest side of a texture, px, that graphics hardware of the last ten years accepts.
+/// Maximum side of a texture, px, that graphics hardware of the last ten years accepts.
 pub const MAX_TEXTURE_PX: u32 = 16_384;
 
-/// Least texels along the edge of a cell: tags are read from 2 px a cell on, and a camera may see no texel sharp.
+/// Minimum number of texels along the edge of a cell: tags need 2 px per cell, and a camera blurs texels.
 pub const LEAST_TEXELS_PER_BIT: f64 = 4.0;
 
-/// And of squares, whose edges run along its rows and columns: interpolation rounds their ends.
+/// The same for squares. Their edges run along the rows and columns of texels, and interpolation rounds their ends.
 pub const LEAST_TEXELS_PER_SQUARE_BIT: f64 = 12.0;
 
-/// Thickness of a plate, mm, unless another is asked for.
+/// Default thickness of a plate, mm.
 pub const PLATE_MM: f64 = 3.0;
 
-/// Why a target has no mesh.
+/// Error of making a mesh of a target.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
-    /// The target is known by its corners only, or is a sheet of tags.
-    #[error("{0} was made neither as a board nor as a solid: it has no mesh")]
+    /// The target is a list of corners or a sheet of tags.
+    #[error("{0} is neither a board nor a solid, so it has no mesh")]
     NoShape(String),
-    /// Several boards that lie about have no place beside each other.
-    #[error("{0} has {1} boards, of which each is a mesh of its own: make one at a time")]
+    /// Several independent boards have no relative pose.
+    #[error("{0} has {1} boards, and each needs its own mesh: make one at a time")]
     SeveralBoards(String, usize),
     /// A texture would be too large.
     #[error(
-        "the texture would have {width} x {height} px, more than {MAX_TEXTURE_PX} a side: {instead}"
+        "the texture would have {width} x {height} px, more than {MAX_TEXTURE_PX} on a side: {instead}"
     )]
     Texture {
         /// Width, px.
         width: u32,
         /// Height, px.
         height: u32,
-        /// What to do.
+        /// The remedy.
         instead: String,
     },
-    /// The requested resolution leaves the tags unsharp.
+    /// The requested resolution is too low for sharp tags.
     #[error(
-        "the texture would have {texels:.1} texels per {cell}, at least {needed} are needed: give {least}"
+        "the texture would have {texels:.1} texels per {cell}, but at least {needed} are needed: set {least}"
     )]
     Unsharp {
-        /// What must be sharp.
+        /// The feature that must be sharp.
         cell: &'static str,
         /// Texels per bit.
         texels: f64,
-        /// How many are needed.
+        /// The number needed.
         needed: f64,
-        /// What would do: a resolution in the unit of what was asked for, or more textures.
+        /// The minimum setting: a resolution in the unit of the request, or more textures.
         least: String,
     },
     /// More textures than faces, or none.
-    #[error("the texture of {} cannot be split in {asked}: give {}", counted(*faces, "face"), up_to(*most))]
+    #[error("the texture of {} cannot be split into {asked}: set {}", counted(*faces, "face"), up_to(*most))]
     Textures {
         /// Number of textures.
         asked: u32,
@@ -74,30 +73,30 @@ pub enum MeshError {
         /// Most textures.
         most: u32,
     },
-    /// A board with two sides where one is asked for.
-    #[error("{0} has two sides: two bodies are printed with their board on one")]
+    /// A board with two sides, where one side is needed.
+    #[error("{0} has two sides, but two-colour bodies have a board on one side only")]
     TwoSides(String),
-    /// A thickness that no plate has.
-    #[error("a plate cannot be {0} mm thick: give 0.1 to 1000 mm")]
+    /// An invalid thickness of a plate.
+    #[error("a plate cannot be {0} mm thick: set 0.1 to 1000 mm")]
     Thickness(f64),
-    /// An inlay that is thinner than any layer.
-    #[error("an inlay cannot be {0} mm deep: give {LEAST_INLAY_MM} mm or more")]
+    /// An inlay that is thinner than any printed layer.
+    #[error("an inlay cannot be {0} mm deep: set {LEAST_INLAY_MM} mm or more")]
     ThinInlay(f64),
-    /// An inlay that is as deep as the plate, or that meets that of another face.
-    #[error("an inlay cannot be {inlay_mm} mm deep there: give less than {most_mm:.2} mm")]
+    /// An inlay that is as deep as the plate, or that meets the inlay of another face.
+    #[error("an inlay cannot be {inlay_mm} mm deep here: set less than {most_mm:.2} mm")]
     DeepInlay {
         /// Depth of the inlay, mm.
         inlay_mm: f64,
-        /// Depth at which it reaches through the plate, or meets another, mm.
+        /// Depth at which it reaches through the plate or meets another inlay, mm.
         most_mm: f64,
     },
     /// A solid that is not convex.
-    #[error("{0} has faces that lean towards each other: it is not made as two bodies")]
+    #[error("{0} is not convex, so it cannot be made as two bodies")]
     Dented(String),
     /// Shapes of the drawing cross each other.
-    #[error("what is drawn on it crosses itself: it cannot be made as two bodies")]
+    #[error("its drawing crosses itself, so it cannot be made as two bodies")]
     Crossing,
-    /// A skeleton is no closed body.
+    /// A skeleton is not a closed body.
     #[error("the skeleton cannot be made as one body: {0}")]
     Skeleton(#[from] ClosedMeshError),
     /// The faces cannot be made.
@@ -111,15 +110,15 @@ pub enum MeshError {
     Encode(#[from] io::Error),
 }
 
-/// How finely a texture is drawn.
+/// Resolution of a texture.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Resolution {
-    /// By [`TEXELS_PER_BIT`], or as finely as [`MAX_TEXTURE_PX`] permits.
+    /// From [`TEXELS_PER_BIT`], limited by [`MAX_TEXTURE_PX`].
     #[default]
     Usual,
     /// Dots per inch on the target.
     Dpi(f64),
-    /// No side of a texture is longer than this, px.
+    /// Maximum side of a texture, px.
     Side(u32),
 }
 
@@ -127,17 +126,17 @@ fn up_to(most: u32) -> String {
     if most == 1 { "1".to_owned() } else { format!("1 to {most}") }
 }
 
-/// How a mesh is made.
+/// Settings of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Meshing {
-    /// Of the textures.
+    /// Resolution of the textures.
     pub resolution: Resolution,
-    /// Among how many textures the faces are shared, 1 to [`MAX_TEXTURES`](super::texture::MAX_TEXTURES).
+    /// Number of textures that share the faces, 1 to [`MAX_TEXTURES`](super::texture::MAX_TEXTURES).
     pub textures: u32,
     /// Thickness of the plate of a board, mm.
     pub plate_mm: f64,
-    /// Depth of what is dark, mm, where it is a body of its own.
+    /// Depth of the dark parts, mm, if they are a separate body.
     pub inlay_mm: f64,
 }
 

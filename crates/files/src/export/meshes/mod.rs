@@ -1,8 +1,8 @@
-//! Targets in space.
+//! Targets as meshes and solid bodies.
 //!
-//! `meshing` says how a mesh is made, `texture` how large its pictures are, `mesh` makes it; `gltf`, `obj` and `scene` write it.
-//! `inlay` makes two bodies of a target, which `threemf` writes; [`stl`] has solids without a print. `solid_mesh` reads the meshes of
-//! others to put boards on.
+//! `meshing` has the settings and errors of meshes, `texture` the sizes of textures; `mesh` makes a mesh, and `gltf`, `obj` and
+//! `scene` write it. `inlay` makes two bodies of a target, which `threemf` writes; [`stl`] writes solids without a print.
+//! `solid_mesh` reads meshes of other programs to put boards on.
 
 #[cfg(feature = "meshes")]
 pub mod gltf;

@@ -11,7 +11,7 @@ use crate::export::GENERATOR;
 use crate::limits;
 use deltille_core::targets::{ClosedMesh, ClosedMeshError, is_coordinate};
 
-/// Why an OBJ cannot be used as a solid.
+/// Error of using an OBJ as a solid.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ObjError {
@@ -27,11 +27,11 @@ pub enum ObjError {
 }
 
 /// Reads the faces of all objects and groups of an OBJ as one solid, in the unit of the file;
-/// lines, points, materials and texture coordinates are ignored. The second value tells whether the
+/// lines, points, materials and texture coordinates are ignored. The second value is true if the
 /// surface was inside out.
 ///
 /// # Errors
-/// When the file is not a valid OBJ, or its faces are not one closed surface of flat, convex faces.
+/// Returns an error if the file is not a valid OBJ, or if its faces are not one closed surface of flat, convex faces.
 pub fn read(text: &[u8]) -> Result<(ClosedMesh, bool), ObjError> {
     let options =
         tobj::LoadOptions { ignore_lines: true, ignore_points: true, ..Default::default() };
@@ -42,14 +42,14 @@ pub fn read(text: &[u8]) -> Result<(ClosedMesh, bool), ObjError> {
     for mesh in models.iter().map(|model| &model.mesh) {
         let first = vertices.len();
         vertices.extend(mesh.positions.as_chunks::<3>().0.iter().copied().map(DVec3::from));
-        // Without the numbers of their corners, all faces are triangles.
+        // If the numbers of corners are missing, all faces are triangles.
         let triangles = vec![3; mesh.indices.len() / 3];
         let counts = if mesh.face_arities.is_empty() { &triangles } else { &mesh.face_arities };
         let mut indices = mesh.indices.iter().map(|&index| first + index as usize);
         faces.extend(counts.iter().map(|&n| indices.by_ref().take(n as usize).collect::<Vec<_>>()));
     }
     ClosedMesh::new(&vertices, &faces).map_err(|error| match error {
-        // The reader numbers vertices as faces name them, the user as the file lists them.
+        // The reader numbers vertices in the order of use in faces, the user in the order of the file.
         ClosedMeshError::NotFinite(used) => {
             ClosedMeshError::NotFinite(first_not_finite(text).unwrap_or(used)).into()
         }
@@ -70,12 +70,12 @@ pub fn text(mesh: &TexturedMesh) -> String {
     listed(mesh, 0..mesh.textures.len())
 }
 
-/// The text of [`part_name`]: what [`text`] has of one texture, for readers that take one for a mesh.
+/// The text of [`part_name`]: the part of [`text`] with one texture, for readers that support one texture per mesh.
 pub fn part(mesh: &TexturedMesh, texture: usize) -> String {
     listed(mesh, texture..texture + 1)
 }
 
-/// File name of the part of a mesh that has a texture, counted from 0.
+/// File name of the part of a mesh with one texture, counted from 0.
 pub fn part_name(name: &str, texture: usize) -> String {
     format!("{name}-{}.obj", texture + 1)
 }
@@ -119,7 +119,7 @@ pub fn material(mesh: &TexturedMesh) -> String {
     format!("# {GENERATOR}, material\n") + &(0..count).map(material).collect::<String>()
 }
 
-/// Name of the material of a texture, counted from 0, among so many.
+/// Name of the material of one of `count` textures, counted from 0.
 pub fn material_name(texture: usize, count: usize) -> String {
     numbered(MATERIAL.to_owned(), "-", texture, count)
 }
@@ -127,13 +127,13 @@ pub fn material_name(texture: usize, count: usize) -> String {
 /// Name of the only material.
 pub const MATERIAL: &str = "print";
 
-/// File name of a texture, counted from 0, of a target of this name, among so many: `<name>-texture.png`, or
+/// File name of one of `count` textures, counted from 0, of a target with this name: `<name>-texture.png`, or
 /// `<name>-texture-1.png` and so on.
 pub fn texture_name(name: &str, texture: usize, count: usize) -> String {
     numbered(format!("{name}-texture"), "-", texture, count) + ".png"
 }
 
-/// A word for one of so many, counted from 0, with its number where there are several.
+/// A name for one of `count` items, counted from 0; with several items, it ends with the number.
 pub(in crate::export) fn numbered(
     word: String,
     between: &str,

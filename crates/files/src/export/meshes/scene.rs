@@ -1,7 +1,7 @@
 //! Targets as models for simulators: SDF (Gazebo), URDF (ROS), MJCF (MuJoCo) and USD (Isaac, Omniverse, Blender).
 //!
-//! SDF, URDF and MJCF name the mesh in `<name>.obj`, which is in mm, with its materials and textures; USD holds the mesh
-//! and names the textures. The frame of the model is the target frame; models are fixed where they are put.
+//! SDF, URDF and MJCF refer to `<name>.obj`, which is in mm, with its materials and textures. USD contains the mesh and refers to
+//! the textures. The frame of the model is the target frame; models are static.
 
 use glam::{DVec2, DVec3};
 
@@ -9,7 +9,7 @@ use super::mesh::TexturedMesh;
 use super::obj::{numbered, part_name, texture_name};
 use crate::export::GENERATOR;
 
-/// Metres per millimetre, along each axis, as the formats have it.
+/// Metres per millimetre along each axis, in the syntax of the formats.
 pub const SCALE: &str = "0.001 0.001 0.001";
 
 /// `<name>.sdf`, a static model with one link.
@@ -39,10 +39,10 @@ pub fn urdf(name: &str) -> String {
     )
 }
 
-/// `<name>.xml` for MuJoCo, a body without joints. Textures are seen as they are, without gloss.
+/// `<name>.xml` for MuJoCo, a body without joints. Materials have no gloss.
 ///
-/// A mesh has one texture there. Of several, each is shown on its part of the mesh, see [`part_name`], which has no
-/// volume; what meets others is the whole mesh, which is in a group that is not shown.
+/// In MuJoCo, a mesh has one texture. With several textures, each has its own part of the mesh (see [`part_name`]) without
+/// volume. Collisions use the whole mesh, which is in a hidden group.
 pub fn mjcf(name: &str, textures: usize) -> String {
     let body = model_name(name);
     let mesh = format!("<mesh name=\"{name}\" file=\"{name}.obj\" scale=\"{SCALE}\"/>");
@@ -79,7 +79,7 @@ pub fn mjcf(name: &str, textures: usize) -> String {
     )
 }
 
-/// A texture and its material, which have the same name.
+/// A texture and its material with the same name.
 fn mjcf_material(name: &str, texture: &str) -> String {
     format!(
         "    <texture name=\"{name}\" type=\"2d\" file=\"{texture}\"/>\n    \
@@ -87,8 +87,8 @@ fn mjcf_material(name: &str, texture: &str) -> String {
     )
 }
 
-/// `<name>.usda`, a mesh in metres, z up, with a `UsdPreviewSurface`, of several textures one for each on a subset of
-/// the faces. Corners of triangles are not shared, so that normals are exact.
+/// `<name>.usda`, a mesh in metres, z up, with a `UsdPreviewSurface`; several textures have one each on a subset of the faces.
+/// Triangles do not share corners, so normals are exact.
 pub fn usda(mesh: &TexturedMesh) -> String {
     let count = mesh.textures.len();
     let faces = || (0..count).flat_map(|texture| mesh.faces_of(texture));
@@ -135,10 +135,10 @@ pub const USD_LISTS: [&str; 6] = [
     "texCoord2f[] primvars:st",
 ];
 
-/// And, where there are several textures, the faces of each, in their order.
+/// The list of the faces of each texture, in order, if there are several textures.
 pub const USD_SUBSET: &str = "int[] indices";
 
-/// A [`usda`] of so many textures whose lists are empty.
+/// A [`usda`] with the given number of textures and empty lists.
 pub fn usda_frame(name: &str, textures: usize) -> String {
     let prim = identifier(name);
     let binding = |texture: usize, indent: &str| {
@@ -198,14 +198,14 @@ def Xform "{prim}" (
     )
 }
 
-/// What a mesh with one material says of itself.
+/// Declaration of a mesh with one material.
 const MATERIAL_SCHEMA: &str = " (\n        prepend apiSchemas = [\"MaterialBindingAPI\"]\n    )";
 
-/// What one with several says of their subsets.
+/// Declaration of a mesh with several materials on subsets.
 const SUBSETS_COVER_ALL: &str =
     "        uniform token subsetFamily:materialBind:familyType = \"partition\"\n";
 
-/// A material with a texture, counted from 0, among so many.
+/// A material with one of `textures` textures, counted from 0.
 fn usda_material(name: &str, texture: usize, textures: usize) -> String {
     let (prim, file) = (identifier(name), texture_name(name, texture, textures));
     let material = numbered("material".to_owned(), "_", texture, textures);
@@ -245,7 +245,7 @@ fn usda_material(name: &str, texture: usize, textures: usize) -> String {
     )
 }
 
-/// The name of a model: that of the target, unless simulators keep that for themselves.
+/// The name of a model: that of the target, unless simulators reserve it.
 fn model_name(name: &str) -> String {
     let is_kept = name == "world" || name.starts_with("__") && name.ends_with("__");
     if is_kept { format!("target-{name}") } else { name.to_owned() }
@@ -255,7 +255,7 @@ fn head() -> String {
     format!("<?xml version=\"1.0\"?>\n<!-- {GENERATOR} -->\n")
 }
 
-/// A name as USD has it: letters, digits and underscores.
+/// A valid name in USD: letters, digits and underscores.
 pub fn identifier(name: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
     let name: String = name.chars().map(plain).collect();

@@ -1,4 +1,4 @@
-//! Closed meshes to put boards on, from files of other programs: OBJ, STL and PLY, told apart by their content.
+//! Closed meshes to put boards on, from files of other programs: OBJ, STL and PLY, recognised by their content.
 
 use std::io::Cursor;
 
@@ -10,19 +10,19 @@ use super::obj::{self, ObjError};
 use crate::limits;
 use deltille_core::targets::{ClosedMesh, ClosedMeshError};
 
-/// Why a file cannot be used as a solid.
+/// Error of using a file as a solid.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshFileError {
-    /// It is no OBJ, or not closed.
+    /// It is not a valid OBJ, or not closed.
     #[error(transparent)]
     Obj(#[from] ObjError),
-    /// It begins as an STL or a PLY, and is none.
+    /// It begins like an STL or a PLY, but is not valid.
     #[error("not a readable {format}: {problem}")]
     Grammar {
         /// STL or PLY.
         format: &'static str,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
     /// The reader panicked.
@@ -33,21 +33,21 @@ pub enum MeshFileError {
     Mesh(#[from] ClosedMeshError),
 }
 
-/// Bytes of a binary STL before its triangles, and of a triangle.
+/// Size of a binary STL before its triangles, and of one triangle, bytes.
 const STL_HEAD: usize = 84;
 const STL_TRIANGLE: usize = 50;
 
-/// Vertices, and the faces between them by their indices.
+/// Vertices, and faces as indices of vertices.
 type Faces = (Vec<DVec3>, Vec<Vec<usize>>);
 
-/// Reads them from a file, or says what is wrong with it.
+/// Reads vertices and faces from a file, or returns the problem.
 type Read = fn(&[u8]) -> Result<Faces, String>;
 
-/// Reads a file as one solid, in the unit of the file. Triangles of an STL or a PLY that lie in one plane are one face. The second
-/// value tells whether the surface was inside out.
+/// Reads a file as one solid, in the unit of the file. Coplanar triangles of an STL or a PLY become one face. The second
+/// value is true if the surface was inside out.
 ///
 /// # Errors
-/// When the file is not a valid OBJ, STL or PLY, or its faces are not one closed surface of flat, convex faces.
+/// Returns an error if the file is not a valid OBJ, STL or PLY, or if it is not one closed surface of flat, convex faces.
 pub fn read(bytes: &[u8]) -> Result<(ClosedMesh, bool), MeshFileError> {
     let (format, read): (_, Read) = if bytes.starts_with(b"ply") {
         ("PLY", ply)
@@ -62,7 +62,7 @@ pub fn read(bytes: &[u8]) -> Result<(ClosedMesh, bool), MeshFileError> {
     Ok((mesh.with_whole_faces()?, inside_out))
 }
 
-/// Whether the length is that of the triangles that it states.
+/// Whether the length matches the stated number of triangles.
 fn is_binary_stl(bytes: &[u8]) -> bool {
     let count = bytes.get(STL_HEAD - 4..STL_HEAD).and_then(|count| count.try_into().ok());
     let length = count.map(|count| u32::from_le_bytes(count) as usize);
@@ -71,12 +71,12 @@ fn is_binary_stl(bytes: &[u8]) -> bool {
 }
 
 fn stl(bytes: &[u8]) -> Result<Faces, String> {
-    // Text has no zeros.
+    // Text contains no zero bytes.
     if bytes.contains(&0) && !is_binary_stl(bytes) {
-        return Err("its length is not that of the triangles that it states".to_owned());
+        return Err("its length does not match the stated number of triangles".to_owned());
     }
     let mut bytes = bytes.to_vec();
-    // The reader takes what begins with `solid` for text, as many programs begin a binary file, too.
+    // The reader treats files that begin with `solid` as text, but many programs begin binary files with it, too.
     if is_binary_stl(&bytes) {
         bytes[..STL_HEAD - 4].fill(b' ');
     }
@@ -87,13 +87,13 @@ fn stl(bytes: &[u8]) -> Result<Faces, String> {
 }
 
 fn ply(bytes: &[u8]) -> Result<Faces, String> {
-    // The reader sets aside what the header promises; each element takes a byte at least.
+    // The reader allocates the sizes in the header; each element takes at least one byte.
     let head = String::from_utf8_lossy(&bytes[..bytes.len().min(1 << 16)]);
     let lines = head.lines().take_while(|line| line.trim() != "end_header");
     let promised = lines.filter_map(|line| line.trim().strip_prefix("element "));
     let count = |line: &str| line.split_whitespace().nth(1)?.parse::<usize>().ok();
     if promised.map(count).any(|count| count.is_none_or(|count| count > bytes.len())) {
-        return Err("it has fewer elements than its header says".to_owned());
+        return Err("it has fewer elements than its header states".to_owned());
     }
     let read: Result<Ply<DefaultElement>, _> =
         Parser::<DefaultElement>::new().read_ply(&mut Cursor::new(bytes));
@@ -149,7 +149,7 @@ mod tests {
     use super::*;
     use crate::export::meshes::stl;
 
-    /// A cube with its sides in two triangles each.
+    /// A cube with two triangles per side.
     fn cube() -> Vec<[DVec3; 3]> {
         let corner = |i: usize| DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64);
         let squares =
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn triangles_of_one_plane_are_one_face() {
+    fn coplanar_triangles_are_one_face() {
         let binary = stl::to_bytes("cube", &cube());
         let facet = |[a, b, c]: &[DVec3; 3]| {
             let vertex = |v: &DVec3| format!("vertex {} {} {}\n", v.x, v.y, v.z);
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_broken_is_refused() {
+    fn broken_files_are_refused() {
         let whole = stl::to_bytes("cube", &cube());
         let promise =
             "ply\nformat ascii 1.0\nelement vertex 4000000000\nproperty float x\nend_header\n";

@@ -26,7 +26,7 @@ pub fn header(name: &str) -> [u8; 80] {
     header
 }
 
-/// The file name of the skeleton of a target of this name.
+/// The file name of the skeleton of a target with this name.
 pub fn skeleton_name(name: &str) -> String {
     format!("{name}-skeleton.stl")
 }

@@ -1,8 +1,8 @@
-//! How large the textures of a mesh are, and which faces each of them shows.
+//! The sizes of the textures of a mesh, and the faces on each texture.
 //!
 //! ```text
-//!   faces  0 1 2 3 4 5 6 7 8     in their order, so that each texture has about as much to show
-//!          ╰──╮──╯ ╰─╮─╯ ╰╮╯     and all are as sharp
+//!   faces  0 1 2 3 4 5 6 7 8     in order, shared so that all textures have about the same area
+//!          ╰──╮──╯ ╰─╮─╯ ╰╮╯     and the same sharpness
 //!   texture   1      2    3
 //! ```
 
@@ -14,10 +14,10 @@ use deltille_core::setting::Setting::MeshingTextures;
 use deltille_core::targets::{Face, Panel};
 use deltille_layout::artwork::Atlas;
 
-/// Most textures of a mesh: readers hold all of them at the same time.
+/// Maximum number of textures of a mesh: readers keep all of them in memory.
 pub const MAX_TEXTURES: u32 = 64;
 
-/// What carries boards: the faces of a solid, or the sides of a plate.
+/// The surface that carries boards: the faces of a solid, or the sides of a plate.
 #[derive(Clone, Copy)]
 pub(in crate::export) enum Surface<'a> {
     Faces(&'a [Face]),
@@ -48,29 +48,29 @@ impl Surface<'_> {
     }
 }
 
-/// Some faces, by their numbers, and how they lie on their texture.
+/// Some faces, by their numbers, and their arrangement on a texture.
 pub(in crate::export) struct Picture {
     pub faces: Range<usize>,
     pub atlas: Atlas,
 }
 
-/// The smallest thing on a surface, which must be sharp.
+/// The smallest feature on a surface, which must be sharp.
 #[derive(Clone, Copy)]
 pub(in crate::export) struct Finest {
-    /// What it is called.
+    /// Its name in messages.
     pub name: &'static str,
     /// Its edge, mm.
     pub mm: f64,
-    /// Texels that it needs.
+    /// Number of texels that it needs.
     pub needed: f64,
-    /// What to do where no texture is large enough.
+    /// The remedy if no texture is large enough.
     pub coarser: &'static str,
 }
 
-/// The textures of a surface, `count` of them, at the resolution that is asked for.
+/// Returns the `count` textures of a surface at the requested resolution.
 ///
 /// # Errors
-/// When there are fewer faces than textures, or a texture would be too large, or too coarse.
+/// Returns an error if there are fewer faces than textures, or if a texture would be too large or too coarse.
 pub(in crate::export) fn pictures(
     surface: Surface,
     count: u32,
@@ -83,7 +83,7 @@ pub(in crate::export) fn pictures(
     if !(1..=most).contains(&asked) {
         return Err(MeshError::Textures { asked, faces, most });
     }
-    // Pixels per metre that so many texels a cell are.
+    // Pixels per metre for a number of texels per cell.
     let per_m = |texels: f64| (1e3 * texels / cell_mm).ceil().clamp(1.0, u32::MAX.into()) as u32;
     let set = Set { surface, shares: shares(&surface.areas(), count as usize) };
     let pictures = match resolution {
@@ -91,7 +91,7 @@ pub(in crate::export) fn pictures(
         Resolution::Dpi(dpi) => set.at((dpi / 0.0254).ceil().clamp(1.0, u32::MAX.into()) as u32),
         Resolution::Side(side) => set.within(side.min(MAX_TEXTURE_PX), per_m(TEXELS_PER_BIT), true),
     };
-    // A resolution in whole dots per inch may be the least one, rounded.
+    // A resolution in whole dots per inch may be the rounded minimum.
     let texels =
         pictures.first().map_or(0.0, |first| f64::from(first.atlas.px_per_m) * cell_mm / 1e3);
     let is_unsharp = texels < needed * (1.0 - 1e-9);
@@ -99,7 +99,7 @@ pub(in crate::export) fn pictures(
     if !is_unsharp && side <= MAX_TEXTURE_PX {
         return Ok(pictures);
     }
-    // So many more textures of that size would do, with some pixels to spare for spaces, which are in px.
+    // Number of textures of this size that would suffice, with spare pixels for the spaces, which are in px.
     let or_more = |side: u32, px_per_m: u32| {
         let enough = |&count: &u32| {
             let set = Set { surface, shares: shares(&surface.areas(), count as usize) };
@@ -135,7 +135,7 @@ pub(in crate::export) fn pictures(
     })
 }
 
-/// Some for spaces between faces.
+/// Spare factor for the spaces between faces.
 const SPARE: f64 = 1.02;
 
 fn too_large(pictures: &[Picture], instead: String) -> MeshError {
@@ -149,7 +149,7 @@ fn longest(pictures: &[Picture]) -> u32 {
     pictures.iter().flat_map(|picture| picture.atlas.size_px).max().unwrap_or(1)
 }
 
-/// A surface whose faces are shared among textures.
+/// A surface whose faces are divided among textures.
 struct Set<'a> {
     surface: Surface<'a>,
     shares: Vec<Range<usize>>,
@@ -164,9 +164,8 @@ impl Set<'_> {
         self.shares.iter().map(picture).collect()
     }
 
-    /// The finest textures whose sides have no more than `side` px, or, unless that is to be `filled`, those of the
-    /// usual resolution where these are smaller. Space between faces is in px, so that sizes are not quite in
-    /// proportion to the resolution.
+    /// The finest textures with sides of at most `side` px. Unless they should be `filled`, the usual resolution is not
+    /// exceeded. Space between faces is in px, so sizes are not exactly proportional to the resolution.
     fn within(&self, side: u32, usual_px_per_m: u32, filled: bool) -> Vec<Picture> {
         let mut px_per_m = usual_px_per_m;
         let mut found = self.at(px_per_m);
@@ -186,13 +185,13 @@ impl Set<'_> {
     }
 }
 
-/// A texture that is so much of the longest side is as large as can be.
+/// Fraction of the maximum side at which a texture counts as filled.
 const CLOSE: f64 = 0.99;
 
-/// Each attempt is nearer by the part that spaces are of the whole.
+/// Maximum number of attempts; each reduces the error by the fraction of the side that spaces take up.
 const MOST_ATTEMPTS: usize = 12;
 
-/// So many runs of faces of about the same area each, none of them empty; there are at least as many faces.
+/// Divides the faces into `count` non-empty runs of about the same area; there are at least `count` faces.
 fn shares(areas: &[f64], count: usize) -> Vec<Range<usize>> {
     let mut left: f64 = areas.iter().sum();
     let mut end = 0;
@@ -200,7 +199,7 @@ fn shares(areas: &[f64], count: usize) -> Vec<Range<usize>> {
         let (start, after) = (end, count - 1 - index);
         let aim = left / (after + 1) as f64;
         let mut taken = 0.0;
-        // A face belongs to the share that has its middle; those after need one each, the last takes all.
+        // A face belongs to the share that contains its middle. Later shares need one face each; the last takes the rest.
         while end < areas.len() - after
             && (end == start || after == 0 || taken + areas[end] / 2.0 <= aim)
         {
@@ -218,7 +217,7 @@ mod tests {
     use super::shares;
 
     #[test]
-    fn faces_are_shared_by_their_areas_and_no_texture_is_without() {
+    fn textures_share_faces_by_area_and_none_is_empty() {
         assert_eq!(shares(&[1.0; 10], 3), [0..3, 3..7, 7..10]);
         assert_eq!(shares(&[1.0; 320], 4), [0..80, 80..160, 160..240, 240..320]);
         assert_eq!(shares(&[9.0, 1.0, 1.0, 1.0], 2), [0..1, 1..4]);

@@ -1,8 +1,8 @@
-//! 3MF of two bodies, white and black, or of a skeleton: the core specification only, with a base material for each body,
-//! in millimetres.
+//! 3MF of two bodies, white and black, or of a skeleton, in millimetres. Uses only the core specification, with a base material
+//! for each body.
 //!
-//! Two bodies are components of one object, which slicers that know of parts take for its parts; others take them for two
-//! objects in their places.
+//! Two bodies are components of one object. Slicers that support parts treat them as parts; others treat them as two objects in
+//! their positions.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -16,10 +16,10 @@ use crate::export::GENERATOR;
 use deltille_core::targets::{ClosedMesh, ClosedMeshError, Target, triangles};
 use deltille_layout::artwork::subject;
 
-/// The part of the file that holds the bodies.
+/// The part of the file that contains the bodies.
 pub const MODEL: &str = "3D/3dmodel.model";
 
-/// The other parts, with their contents, which are the same in all files; the first names this program.
+/// The other parts with their contents, which are the same in all files; the first contains the name of this program.
 pub fn fixed_parts() -> [(&'static str, String); 2] {
     let head = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
     let types = format!(
@@ -44,12 +44,12 @@ pub const INLAY: &[&str] = &["white", "black"];
 /// The name of the one body of a skeleton.
 pub const SKELETON: &[&str] = &["skeleton"];
 
-/// The file name of the skeleton of a target of this name.
+/// The file name of the skeleton of a target with this name.
 pub fn skeleton_name(name: &str) -> String {
     format!("{name}-skeleton.3mf")
 }
 
-/// The content of `<name>.3mf`, the same in every run.
+/// The content of `<name>.3mf`; it is reproducible.
 pub fn to_bytes(bodies: &InlaidBodies) -> Vec<u8> {
     let head = frame(&bodies.name, &bodies.subject, INLAY);
     packed(&model(&head, &[&bodies.white, &bodies.black]))
@@ -58,7 +58,7 @@ pub fn to_bytes(bodies: &InlaidBodies) -> Vec<u8> {
 /// The content of `<name>-skeleton.3mf`, from the triangles of a skeleton, mm.
 ///
 /// # Errors
-/// When these are not one closed surface.
+/// Returns an error if the triangles are not one closed surface.
 pub fn skeleton(target: &Target, triangles_mm: &[[DVec3; 3]]) -> Result<Vec<u8>, ClosedMeshError> {
     let corners: Vec<usize> = (0..3 * triangles_mm.len()).collect();
     let (mesh, _) = ClosedMesh::new(triangles_mm.as_flattened(), corners.as_chunks::<3>().0)?;
@@ -81,7 +81,7 @@ fn packed(model: &str) -> Vec<u8> {
 /// The text of [`MODEL`], from its [`frame`].
 fn model(head: &str, bodies: &[&Body]) -> String {
     let vertices = bodies.iter().flat_map(|body| &body.vertices_mm);
-    // The target frame, moved to where all coordinates are positive, as printers have it.
+    // Printers need positive coordinates, so the target frame is shifted.
     let least = vertices.copied().reduce(DVec3::min).unwrap_or_default();
     let [x, y, z] = least.to_array().map(|mm| decimal(-mm));
     let place = format!("{TURN}{x} {y} {z}\"/>");
@@ -103,10 +103,10 @@ fn model(head: &str, bodies: &[&Body]) -> String {
     text
 }
 
-/// Before the three numbers that tell where on the printer the object is put: it is not turned.
+/// The identity rotation that precedes the three numbers of the position on the printer.
 pub const TURN: &str = "transform=\"1 0 0 0 1 0 0 0 1 ";
 
-/// The text of [`MODEL`] with bodies of these names, without their vertices and triangles, and without the place on the
+/// The text of [`MODEL`] with bodies of these names, without their vertices and triangles, and without the position on the
 /// printer.
 pub fn frame(name: &str, subject: &str, bodies: &[&str]) -> String {
     let escaped = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
@@ -147,7 +147,7 @@ pub fn frame(name: &str, subject: &str, bodies: &[&str]) -> String {
     )
 }
 
-/// The id of the first body; the materials are before it.
+/// The id of the first body; the materials precede it.
 const FIRST_ID: usize = 2;
 
 fn vertices_of(body: &Body, text: &mut String) {
@@ -164,17 +164,17 @@ fn triangles_of(body: &Body, text: &mut String) {
     }
 }
 
-/// A length with nine decimals at most, without an exponent or a negative zero.
+/// A length with at most nine decimals, without an exponent or a negative zero.
 fn decimal(mm: f64) -> String {
     let text = format!("{mm:.9}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// Versions of the format that a reader needs: 2.0, for folders and compression.
+/// Version of the format that a reader needs: 2.0, for folders and compression.
 const ZIP_VERSION: u16 = 20;
 
-/// A ZIP file of parts, with their names and contents, and whether they are compressed; of no date.
+/// A ZIP file of parts with their names, contents and compression flags. It has no date.
 fn zip(parts: &[(&str, &[u8], bool)]) -> Vec<u8> {
     let mut file = Vec::new();
     let mut directory = Vec::new();
@@ -183,7 +183,7 @@ fn zip(parts: &[(&str, &[u8], bool)]) -> Vec<u8> {
         let mut sum = Crc::new();
         sum.update(content);
         let start = length(&file);
-        // Version, flags, method, and the first time and date that there are.
+        // Version, flags, method, and the earliest time and date.
         let head = [ZIP_VERSION, 0, if is_packed { 8 } else { 0 }, 0, 0x21];
         let head = head.into_iter().flat_map(u16::to_le_bytes);
         let sizes = [sum.sum(), length(&packed), length(content)];
@@ -215,7 +215,7 @@ fn zip(parts: &[(&str, &[u8], bool)]) -> Vec<u8> {
 }
 
 fn length(bytes: &[u8]) -> u32 {
-    u32::try_from(bytes.len()).expect("a target has far less than four gigabytes")
+    u32::try_from(bytes.len()).expect("a target is far smaller than four gigabytes")
 }
 
 fn deflated(content: &[u8]) -> Vec<u8> {

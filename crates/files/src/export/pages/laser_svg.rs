@@ -1,7 +1,7 @@
-//! SVG for a laser or a plotter: what is engraved filled in black, what is cut along as a red hairline, in true size; no paper
-//! below it, which a laser would take for something to engrave.
+//! SVG for a laser or a plotter, in true size: engraved areas are filled in black, and cut lines are red hairlines. There is no
+//! paper background, because a laser would engrave it.
 //!
-//! The reader accepts only what the writer writes, so that nothing moves, hides or scales what is cut.
+//! The reader accepts only files in the form of the writer, so nothing can move, hide or scale the cut lines.
 
 use glam::DVec2;
 use kurbo::{BezPath, Point};
@@ -11,16 +11,16 @@ use svg::node::element::{Description, Path, Title};
 use super::svg::{HEAD, data, number};
 use deltille_layout::artwork::{CutDrawing, CutLayer, CutPath};
 
-/// Blank around the drawing, mm.
+/// Blank margin around the drawing, mm.
 pub const AROUND_MM: f64 = 1.0;
 
-/// Width of the lines to cut along, mm: what laser programs take for a hairline.
+/// Width of the cut lines, mm: laser programs treat it as a hairline.
 const HAIRLINE_MM: f64 = 0.01;
 
-/// Layers with the name of their path, in the order of drawing.
+/// Layers with the names of their paths, in drawing order.
 const LAYERS: [(CutLayer, &str); 2] = [(CutLayer::Engrave, "engrave"), (CutLayer::Cut, "cut")];
 
-/// The text of the SVG of a drawing whose paths are closed; those on other layers than these two are left out.
+/// Returns the text of the SVG of a drawing with closed paths; paths on other layers than these two are left out.
 pub fn text(drawing: &CutDrawing, title: &str, subject: &str) -> String {
     let [left, lower, right, upper] = drawing.bounds_mm().unwrap_or_default();
     let [width, height] = [right - left, upper - lower].map(|mm| number(mm + 2.0 * AROUND_MM));
@@ -48,10 +48,10 @@ pub fn text(drawing: &CutDrawing, title: &str, subject: &str) -> String {
     format!("{HEAD}{document}\n")
 }
 
-/// Reads the text of an SVG of this title and subject, mm, y up, from anywhere.
+/// Reads the text of an SVG with this title and subject, mm, y up.
 ///
 /// # Errors
-/// When it is not one that [`text`] writes: the line, counted from 1.
+/// Returns the first differing line, counted from 1, if [`text`] would not write the same text.
 pub fn read(found: &str, title: &str, subject: &str) -> Result<CutDrawing, usize> {
     let mut drawing = CutDrawing::default();
     for (index, line) in found.lines().enumerate() {
@@ -67,19 +67,19 @@ pub fn read(found: &str, title: &str, subject: &str) -> Result<CutDrawing, usize
             drawing.paths.push(CutPath { layer, closed: true, points_mm });
         }
     }
-    // Any version of the program may have written it.
-    let anew = text(&drawing, title, subject);
+    // The version of the program may differ.
+    let rewritten = text(&drawing, title, subject);
     let is_writer = |line: &str| line.starts_with("<!-- deltille ") && line.ends_with(" -->");
-    let mut lines = found.split('\n').zip(anew.split('\n')).enumerate();
+    let mut lines = found.split('\n').zip(rewritten.split('\n')).enumerate();
     let other = lines.find(|(index, (a, b))| a != b && !(*index == 1 && is_writer(a)));
     match other {
         Some((index, _)) => Err(index + 1),
-        None if found.split('\n').count() != anew.split('\n').count() => Err(1),
+        None if found.split('\n').count() != rewritten.split('\n').count() => Err(1),
         None => Ok(drawing),
     }
 }
 
-/// The points of an outline that begins with a move and goes on with lines.
+/// The points of an outline that consists of a move and lines.
 fn points(outline: &str) -> Option<Vec<DVec2>> {
     let point = |words: &str| {
         let (x, y) = words.split_once(' ')?;
@@ -97,7 +97,7 @@ mod tests {
     use deltille_layout::artwork::to_laser;
 
     #[test]
-    fn what_is_written_is_read_and_nothing_else() {
+    fn only_written_files_are_read_back() {
         let board = Printing::new("board", BoardSpec::deltille(3, 4, 20.0)).unwrap();
         let drawing = to_laser(&board, 0.15).unwrap();
         let good = text(&drawing, "board", "a board");

@@ -1,5 +1,5 @@
-//! Artwork to files: `pdf`, `svg` and `png` of whole sheets, `laser_svg` and [`dxf`] of what is cut.
-//! `supersample` renders black marks for pictures.
+//! Files of artwork: `pdf`, `svg` and `png` of whole sheets, `laser_svg` and [`dxf`] for cutters. `supersample` renders black marks
+//! as pixels.
 
 pub mod dxf;
 #[cfg(feature = "print")]

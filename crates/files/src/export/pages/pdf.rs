@@ -1,10 +1,9 @@
 //! PDF: all sheets in one file, one page each.
 //!
-//! Black is pure K (CMYK). Where a finish names spot colours, a white lies beneath the whole page, and lines to cut along have
-//! theirs; all of it overprints, so that no separation has holes under another. What is not printed with these inks shows
-//! the white as paper and the lines as black. The page boxes are the size of the page in points, and viewers are asked
-//! to print without scaling. The same artwork gives the same bytes: there are no dates, and the
-//! identifier of the file is a digest of its content.
+//! Black is pure K (CMYK). A finish may name spot colours: a white beneath the whole page, and a colour for cut lines. All of
+//! them overprint, so no separation has holes under another. Devices without these inks show the white as paper and the lines as
+//! black. The page boxes have the size of the page in points, and viewers are asked to print without scaling. The same artwork
+//! gives the same bytes: there are no dates, and the identifier of the file is a digest of its content.
 
 use std::path::Path;
 
@@ -25,10 +24,10 @@ pub const VERSION: &str = "1.6";
 /// Points per millimetre.
 const PT_PER_MM: f64 = 72.0 / 25.4;
 
-/// Longest side of a page that readers have to accept, mm: 14400 points.
+/// Maximum side of a page that all readers accept, mm: 14400 points.
 const MAX_PAGE_MM: f64 = 5080.0;
 
-/// Names by which the content of a page calls the space of the white, that of lines to cut along, and the state in which
+/// Resource names in the content of a page: the colour space of the white, that of the cut lines, and the state in which
 /// everything overprints.
 pub const WHITE: &str = "White";
 /// See [`WHITE`].
@@ -36,8 +35,7 @@ pub const CONTOUR: &str = "Contour";
 /// See [`WHITE`].
 pub const OVERPRINT: &str = "Overprint";
 
-/// The colour spaces of a finish: a separation for each spot colour, shown as nothing or as black by what does not have
-/// it.
+/// The colour spaces of a finish: a separation for each spot colour. Devices without the ink show nothing or black.
 pub fn color_spaces(finish: &Finish) -> Dictionary {
     let mut spaces = Dictionary::new();
     for (key, name, black) in [(WHITE, &finish.white, 0), (CONTOUR, &finish.contour, 1)] {
@@ -53,7 +51,7 @@ pub fn color_spaces(finish: &Finish) -> Dictionary {
     spaces
 }
 
-/// The graphics states of a finish: where it has spot colours, that in which everything overprints.
+/// The graphics states of a finish: with spot colours, the state in which everything overprints.
 pub fn graphics_states(finish: &Finish) -> Dictionary {
     let mut states = Dictionary::new();
     if finish.spots().next().is_some() {
@@ -66,7 +64,7 @@ pub fn graphics_states(finish: &Finish) -> Dictionary {
 /// Writes all sheets as one PDF file.
 ///
 /// # Errors
-/// When a page is larger than PDF allows, or the file cannot be written.
+/// Returns an error if a page is larger than PDF allows, or if the file cannot be written.
 pub fn write(artwork: &Artwork, path: &Path) -> Result<(), ExportError> {
     let long = |sheet: &&Sheet| sheet.width_mm.max(sheet.height_mm) > MAX_PAGE_MM;
     if let Some(sheet) = artwork.sheets.iter().find(long) {
@@ -74,14 +72,14 @@ pub fn write(artwork: &Artwork, path: &Path) -> Result<(), ExportError> {
             path: path.to_owned(),
             width_mm: sheet.width_mm,
             height_mm: sheet.height_mm,
-            limit: format!("PDF allows {MAX_PAGE_MM} mm: choose smaller paper"),
+            limit: format!("PDF allows at most {MAX_PAGE_MM} mm: choose smaller paper"),
         });
     }
     let bytes = to_bytes(artwork);
     Ok(atomic::write(path, |file| file.write_all(&bytes))?)
 }
 
-/// The bytes of one PDF file with all sheets; they are the same for the same artwork.
+/// Returns the bytes of one PDF file with all sheets; the same artwork gives the same bytes.
 ///
 /// ```
 /// use deltille_layout::Printing;
@@ -148,8 +146,7 @@ fn document(artwork: &Artwork) -> Document {
     document
 }
 
-/// The identifier: a digest of the content instead of a random number, so that the same artwork
-/// gives the same file.
+/// The identifier: a digest of the content instead of a random number, which makes the file reproducible.
 fn identifier(document: &mut Document) -> Vec<Object> {
     let digest = Sha256::digest(saved(document))[..16].to_vec();
     vec![Object::String(digest, StringFormat::Hexadecimal); 2]
@@ -161,7 +158,7 @@ fn saved(document: &mut Document) -> Vec<u8> {
     bytes
 }
 
-/// The operators that draw a sheet: what lies beneath it, then all in black but for lines in a spot colour.
+/// The operators that draw a sheet: the background, then all marks in black, except lines in a spot colour.
 fn operations(sheet: &Sheet, finish: &Finish) -> Vec<Operation> {
     let black: Vec<Object> = [0f32, 0.0, 0.0, 1.0].map(Object::from).to_vec();
     let mut operations = beneath(sheet, finish);
@@ -195,7 +192,7 @@ fn operations(sheet: &Sheet, finish: &Finish) -> Vec<Operation> {
     operations
 }
 
-/// What comes before the marks of a sheet: everything overprints where there are spot colours, and the white.
+/// The operators before the marks of a sheet: with spot colours, the overprint state and the white.
 fn beneath(sheet: &Sheet, finish: &Finish) -> Vec<Operation> {
     let mut operations = Vec::new();
     if finish.spots().next().is_some() {
@@ -217,7 +214,7 @@ struct Contour {
     is_closed: bool,
 }
 
-/// The contours of a path. PDF has cubic curves only, so quadratic ones are raised.
+/// The contours of a path. PDF has only cubic curves, so quadratic curves are converted.
 fn contours(path: &BezPath) -> Vec<Contour> {
     let mut contours = Vec::<Contour>::new();
     let mut at = Point::ZERO;

@@ -11,20 +11,19 @@ use crate::export::writing::{atomic, kind};
 use crate::export::{Block, ExportError, GENERATOR, SUBPIXELS};
 use deltille_layout::artwork::{Paint, Shape, Sheet};
 
-/// Most pixels of an image: 2 gigapixels, as of an A0 sheet at 1200 dpi.
+/// Maximum number of pixels of an image: 2 gigapixels, about an A0 sheet at 1200 dpi.
 const MAX_PIXELS: f64 = 2.0e9;
 
-/// Greatest deviation of the outline of a stroke from its exact curve, mm.
+/// Maximum distance of the outline of a stroke from its exact curve, mm.
 const STROKE_TOLERANCE_MM: f64 = 1e-4;
 
 /// Writes a sheet as a grey 8-bit PNG; `dpi` is the resolution in dots per inch.
 ///
-/// PNG states its resolution in whole pixels per metre; the drawing is scaled by exactly the value
-/// nearest to `dpi`. The image starts at the upper-left corner of the page and has the size of the
-/// page, rounded to whole pixels.
+/// PNG states its resolution in whole pixels per metre; the drawing is scaled by exactly the nearest value to `dpi`. The image
+/// starts at the upper-left corner of the page and has the size of the page, rounded to whole pixels.
 ///
 /// # Errors
-/// When the picture would have more than 2 gigapixels, or the file cannot be written.
+/// Returns an error if the image would have more than 2 gigapixels, or if the file cannot be written.
 pub fn write(sheet: &Sheet, title: &str, path: &Path, dpi: f64) -> Result<(), ExportError> {
     let raster = Raster::new(sheet, dpi);
     if raster.width as f64 * raster.height as f64 > MAX_PIXELS {
@@ -38,17 +37,17 @@ pub fn write(sheet: &Sheet, title: &str, path: &Path, dpi: f64) -> Result<(), Ex
     Ok(atomic::write(path, |file| raster.encode(title, file))?)
 }
 
-/// The same PNG file in memory, for pages of moderate size.
+/// Returns the same PNG file in memory, for pages of moderate size.
 ///
 /// # Errors
-/// When the picture is larger than PNG allows.
+/// Returns an error if the image is larger than PNG allows.
 pub fn to_bytes(sheet: &Sheet, title: &str, dpi: f64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     Raster::new(sheet, dpi).encode(title, &mut bytes)?;
     Ok(bytes)
 }
 
-/// A sheet that is prepared for drawing.
+/// A sheet prepared for drawing.
 struct Raster {
     pixels_per_metre: u32,
     width: usize,
@@ -101,7 +100,7 @@ impl Raster {
         Ok(writer.finish()?)
     }
 
-    /// Coverage of the samples of a block, 255 where fully inked.
+    /// Coverage of the samples of a block; 255 is fully inked.
     fn coverage(&self, block: Block) -> Vec<u8> {
         let (x, y) = (block.x as f64, block.y as f64);
         let bounds = Rect::new(x, y, x + block.width as f64, y + block.height as f64);

@@ -2,11 +2,10 @@
 
 use rayon::prelude::*;
 
-/// Samples for each pixel along each axis. With the four levels of the renderer an edge is placed
-/// to 1/32 px.
+/// Samples per pixel along each axis. With the four levels of the renderer, an edge is located to 1/32 px.
 pub const SUBPIXELS: usize = 4;
 
-/// Longest side of a block, px: its samples stay within the size that tiny-skia draws in one piece.
+/// Maximum side of a block, px: its samples stay within the size that tiny-skia draws in one piece.
 const BLOCK: usize = 1024;
 
 /// A rectangle of an image, px.
@@ -24,11 +23,11 @@ pub struct Block {
 
 /// Renders a grey image of black marks on white, band by band from the top.
 ///
-/// `coverage` draws one block at [`SUBPIXELS`] samples per pixel and axis, row-major, 255 where
-/// fully inked; `sink` receives the grey pixels of each band of full width, in order.
+/// `coverage` draws one block at [`SUBPIXELS`] samples per pixel and axis, row-major; 255 is fully
+/// inked. `sink` receives the grey pixels of each full-width band, in order.
 ///
 /// # Errors
-/// The first error of `sink`.
+/// Returns the first error of `sink`.
 pub fn render<E>(
     width: usize,
     height: usize,

@@ -11,7 +11,7 @@ use crate::export::ExportError;
 use crate::export::writing::atomic;
 use deltille_layout::artwork::{Artwork, Paint, Part, Shape};
 
-/// Decimals of a coordinate: to a tenth of a micrometre.
+/// Decimals of a coordinate: a tenth of a micrometre.
 const DECIMALS: usize = 4;
 
 /// The first lines of a file.
@@ -24,17 +24,17 @@ pub const HEAD: &str = concat!(
 /// Writes sheet `sheet` (counted from 0) as an SVG file.
 ///
 /// # Errors
-/// When the file cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn write(artwork: &Artwork, sheet: usize, path: &Path) -> Result<(), ExportError> {
     let text = to_string(artwork, sheet);
     Ok(atomic::write(path, |file| file.write_all(text.as_bytes()))?)
 }
 
-/// The text of sheet `sheet` (counted from 0) as SVG: one path for each shape, named after its
+/// Returns the text of sheet `sheet` (counted from 0) as SVG: one path for each shape, named after its
 /// part.
 ///
 /// # Panics
-/// When the artwork has no such sheet.
+/// Panics if the artwork has no such sheet.
 ///
 /// ```
 /// use deltille_layout::Printing;
@@ -55,7 +55,7 @@ pub fn to_string(artwork: &Artwork, sheet: usize) -> String {
         .fold(Group::new().set("fill", "#000").set("fill-rule", "evenodd"), |group, shape| {
             group.add(element(shape, svg_from_page))
         });
-    // Without it the page is transparent, and black on a dark viewer's background.
+    // Without it, the page would be transparent, and black in a viewer with a dark background.
     let paper = Rectangle::new().set("width", "100%").set("height", "100%").set("fill", "#fff");
     let document = Document::new()
         .set("width", format!("{width}mm"))

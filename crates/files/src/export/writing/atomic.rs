@@ -1,40 +1,39 @@
 //! Atomic writing: files appear completely or not at all.
 //!
-//! A file is written under a temporary name in the same folder, flushed to the disk, and renamed.
-//! Its writer holds a lock on it, so that what a killed process leaves behind can be recognised and
-//! is removed by the next one; see [`settle`](super::staging::settle).
+//! A file is written under a temporary name in the same folder, flushed to the disk, and renamed. Its writer keeps a lock on it, so
+//! the next process recognises and removes the leftovers of a killed one; see [`settle`](super::staging::settle).
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Prefix of temporary names, and the number of random characters that follow.
+/// Prefix of temporary names, and number of random characters after it.
 const PREFIX: &str = ".deltille-writing-";
 const RANDOM: usize = 6;
 
 /// Temporary files and folders of this process.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Held while a set of files is moved to its final place.
+/// Locked while a set of files is moved to its final paths.
 static MOVING: Mutex<()> = Mutex::new(());
 
-/// Why a file could not be written.
+/// Error of writing a file.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {path}: {source}", path = path.display())]
 pub struct WriteError {
-    /// The file asked for.
+    /// The requested file.
     pub path: PathBuf,
     /// The error of the system.
     pub source: io::Error,
 }
 
-/// Writes a file through `fill`: to a temporary name in the same folder, renamed to `path` once all
-/// content is on the disk. After an error nothing is left behind, and an earlier file is unchanged.
-/// A symbolic link is replaced, and what it leads to is unchanged; a device or a pipe is refused.
+/// Writes a file through `fill` under a temporary name in the same folder, and renames it to `path` when all content is on the disk.
+/// After an error, nothing is left behind, and an earlier file is unchanged. A symbolic link is replaced, and its destination is
+/// unchanged; a device or a pipe is refused.
 ///
 /// # Errors
-/// When `fill` fails, or the file cannot be written.
+/// Returns an error if `fill` fails, or if the file cannot be written.
 pub fn write(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -43,11 +42,11 @@ pub fn write(
     Filled::new(path, fill).and_then(Filled::rename).map_err(failed)
 }
 
-/// Writes several files, as [`write()`] does, after all of them are on the disk under temporary names: where one cannot be
+/// Writes several files like [`write()`]. They are renamed after all are on the disk under temporary names: if one cannot be
 /// written, none is.
 ///
 /// # Errors
-/// When a file cannot be written.
+/// Returns an error if a file cannot be written.
 pub fn write_together(files: &[(PathBuf, Vec<u8>)]) -> Result<(), WriteError> {
     let failed = |path: &Path, source| WriteError { path: path.to_owned(), source };
     let fill = |(path, content): &(PathBuf, Vec<u8>)| {
@@ -60,7 +59,7 @@ pub fn write_together(files: &[(PathBuf, Vec<u8>)]) -> Result<(), WriteError> {
         .try_for_each(|(filled, (path, _))| filled.rename().map_err(|source| failed(path, source)))
 }
 
-/// A file that is written whole, under a temporary name.
+/// A file that is completely written under a temporary name.
 struct Filled {
     file: tempfile::NamedTempFile,
     path: PathBuf,
@@ -70,7 +69,7 @@ struct Filled {
 impl Filled {
     fn new(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<Self> {
         Self::written(path, fill).map_err(|error| match error.to_string().contains(PREFIX) {
-            // The temporary name means nothing to the user.
+            // The user does not know the temporary name.
             true => io::Error::new(error.kind(), io::Error::from(error.kind()).to_string()),
             false => error,
         })
@@ -82,10 +81,7 @@ impl Filled {
     ) -> io::Result<Self> {
         check_place(path)?;
         if path.is_dir() {
-            return Err(io::Error::new(
-                io::ErrorKind::IsADirectory,
-                "there is a folder of that name",
-            ));
+            return Err(io::Error::new(io::ErrorKind::IsADirectory, "a folder has this name"));
         }
         let (file, unfinished) = temporary_file(folder_of(path))?;
         let mut writer = BufWriter::new(file);
@@ -119,25 +115,24 @@ fn temporary_file(folder: &Path) -> io::Result<(tempfile::NamedTempFile, Unfinis
     builder.prefix(PREFIX).rand_bytes(RANDOM);
     #[cfg(unix)]
     {
-        // The umask decides, as for any file that a program creates.
+        // The umask determines the permissions, as for any new file.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
     Unfinished::begin(|| {
         let file = builder.tempfile_in(folder)?;
-        // Where files cannot be locked, nothing that is left over is ever removed.
+        // If files cannot be locked, leftovers are never removed.
         let _ = file.as_file().lock();
         let path = file.path().to_owned();
         Ok((file, path))
     })
 }
 
-/// A temporary file or folder, registered while it is written so that [`abandon`] can remove it.
+/// A temporary file or folder, registered while it is written, so [`abandon`] can remove it.
 pub(in crate::export) struct Unfinished(PathBuf);
 
 impl Unfinished {
-    /// Creates and registers a temporary file or folder. Another process that cleans up may remove
-    /// it before it is locked; then it is created again.
+    /// Creates and registers a temporary file or folder. If another process removes it before it is locked, it is created again.
     pub(in crate::export) fn begin<T>(
         mut make: impl FnMut() -> io::Result<(T, PathBuf)>,
     ) -> io::Result<(T, Self)> {
@@ -158,18 +153,18 @@ impl Drop for Unfinished {
     }
 }
 
-/// The registered temporary files and folders; while this is held, none is created.
+/// The registered temporary files and folders; while the guard exists, none is created.
 fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Keeps [`abandon`] waiting while the result lives.
+/// Makes [`abandon`] wait while the guard exists.
 pub(in crate::export) fn moving() -> MutexGuard<'static, ()> {
     MOVING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Removes the temporary files and folders of this process, and prevents new ones while the result
-/// lives: for a program that is about to end. A set of files that is being moved to its final place
+/// exists: for a program that is about to end. A set of files that is being moved to its final paths
 /// is completed first.
 #[must_use]
 pub fn abandon() -> impl Sized {
@@ -180,7 +175,7 @@ pub fn abandon() -> impl Sized {
     (moving, unfinished)
 }
 
-/// Removes a file or folder; where that fails, the next run will.
+/// Removes a file or folder; if that fails, the next run removes it.
 pub(in crate::export) fn remove(path: &Path) {
     let _ = match path.is_dir() {
         true => std::fs::remove_dir_all(path),
@@ -197,36 +192,36 @@ pub(in crate::export) fn temporary_folder(
     Ok((made, lock))
 }
 
-/// Whether a name is that of a temporary file or folder.
+/// Whether a name belongs to a temporary file or folder.
 pub(in crate::export) fn is_temporary(name: &str) -> bool {
     let random = name.strip_prefix(PREFIX);
     random.is_some_and(|r| r.len() == RANDOM && r.bytes().all(|b| b.is_ascii_alphanumeric()))
 }
 
-/// Waits for the lock of a file or folder, held until the result is dropped; `None` where the
+/// Waits for the lock of a file or folder, which lasts until the result is dropped; `None` if the
 /// system does not support it.
 pub(in crate::export) fn lock(path: &Path) -> Option<File> {
     File::open(path).ok().filter(|file| file.lock().is_ok())
 }
 
-/// Takes the lock of a file or folder unless a living process holds it.
+/// Takes the lock of a file or folder unless a running process has it.
 pub(in crate::export) fn lock_of_left(path: &Path) -> Option<File> {
     File::open(path).ok().filter(|file| file.try_lock().is_ok())
 }
 
-/// Flushes the directory entries of a folder to the disk, where the system supports it.
+/// Flushes the directory entries of a folder to the disk, if the system supports it.
 pub(in crate::export) fn sync_folder(folder: &Path) {
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
 }
 
-/// Checks what a write to `path` would replace: a file, or a symbolic link, itself. Folders are left to the system.
+/// Checks that a write to `path` would replace only a file, or a symbolic link itself. The system handles folders.
 ///
 /// # Errors
-/// When the path is a device or a pipe, or leads to one.
+/// Returns an error if the path is a device or a pipe, or leads to one.
 pub fn check_place(path: &Path) -> io::Result<()> {
     match path.metadata() {
         Ok(there) if !there.is_file() && !there.is_dir() => {
-            Err(io::Error::new(io::ErrorKind::InvalidInput, "it is a device or a pipe, no file"))
+            Err(io::Error::new(io::ErrorKind::InvalidInput, "it is a device or a pipe, not a file"))
         }
         _ => Ok(()),
     }
@@ -238,7 +233,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_are_replaced_themselves_and_pipes_stay() {
+    fn links_are_replaced_and_pipes_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
         std::fs::write(path("real"), "old").unwrap();
@@ -255,12 +250,12 @@ mod tests {
         assert_eq!(std::fs::read(path("real")).unwrap(), b"old");
         assert!(!path("nowhere").exists());
         for pipe in ["socket", "to-socket"] {
-            assert!(new(pipe).unwrap_err().to_string().contains("no file"));
+            assert!(new(pipe).unwrap_err().to_string().contains("not a file"));
         }
     }
 
     #[test]
-    fn of_several_files_all_are_written_or_none() {
+    fn several_files_are_written_all_or_none() {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
         let files =

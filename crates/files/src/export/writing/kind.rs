@@ -1,10 +1,8 @@
-//! Recognises the kind of a file by its content, so that no file replaces one of another kind or of
-//! another writer.
+//! Recognises the kind of a file by its content, so no file replaces one of another kind or of another writer.
 //!
-//! Formats with a place for it name their writer: the schema of a JSON, the creator of a PDF, the
-//! software of a PNG, the generator of a glTF, the first part of a 3MF, the header of an STL, and a comment in the first
-//! lines of a text. Other files are recognised by what they begin with, such as the header of a
-//! CSV, or by the keys of a JSON.
+//! Many formats name their writer: the schema of a JSON, the creator of a PDF, the software of a PNG, the generator of a glTF, the
+//! first part of a 3MF, the header of an STL, and a comment in the first lines of a text. Other files are recognised by their
+//! beginning, for example the header of a CSV, or by the keys of a JSON.
 
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -18,23 +16,22 @@ use crate::export::corners::dsc;
 use deltille_core::json;
 use deltille_core::words::cut;
 
-/// Number of first lines of a text in which its comment is looked for.
+/// Number of first lines of a text that may contain the comment.
 const HEAD_LINES: usize = 3;
 
-/// Bytes of a text in which its first lines are looked for.
+/// Number of first bytes of a text that contain its first lines.
 const HEAD: usize = 4096;
 
-/// How a PDF of this program names its creator.
+/// The creator entry of a PDF of this program.
 const PDF_CREATOR: &[u8] = b"/Creator(deltille ";
 
-/// The first bytes of a Parquet.
+/// The first bytes of a Parquet file.
 const PARQUET: &[u8] = b"PAR1";
 
-/// Words for a list of corners for other detectors; the format has no place for its writer.
+/// Description of a list of corners for other detectors; the format does not name its writer.
 const DSC: &str = "a .dsc";
 
-/// The kind of a file. Two files of one kind have the same format and, where it is stated, the same
-/// writer.
+/// The kind of a file. Two files of one kind have the same format and, if it is stated, the same writer.
 #[derive(Clone, Debug)]
 pub struct Kind(Is);
 
@@ -76,7 +73,7 @@ impl Kind {
         } else if content.starts_with(crate::export::corners::npy::MAGIC) {
             Self::words("an array of NumPy")
         } else if content.starts_with(PARQUET) {
-            // The file ends with what describes it, which ends with the name of its writer.
+            // The file ends with its metadata, which end with the name of the writer.
             let end = &content[content.len().saturating_sub(HEAD)..];
             signed("Parquet", contains(end, b"deltille "))
         } else if content.starts_with(b"glTF") {
@@ -95,7 +92,7 @@ impl Kind {
         }
     }
 
-    /// The kind of a JSON file with this schema, whatever its version.
+    /// The kind of a JSON file with this schema, in any version.
     pub fn of_schema(schema: &str) -> Self {
         Self(Is::Schema(schema.to_owned()))
     }
@@ -104,10 +101,10 @@ impl Kind {
         Self(Is::Words(words.into()))
     }
 
-    /// The kind of a file that is too large to be read whole, where its first and last bytes tell it.
+    /// The kind of a file that is too large to be read completely, if its first and last bytes identify it.
     ///
     /// # Errors
-    /// When the file cannot be read.
+    /// Returns an error if the file cannot be read.
     pub fn of_large(path: &Path) -> io::Result<Option<Self>> {
         let mut file = File::open(path)?;
         let mut content = vec![0; PARQUET.len()];
@@ -151,7 +148,7 @@ impl Kind {
         words.contains("deltille") || words.contains("DelTag") || words == DSC
     }
 
-    /// Only the first value counts: a file of JSON lines has more.
+    /// Uses only the first value, because a file of JSON lines has more.
     fn of_json(content: &[u8]) -> Option<Self> {
         #[derive(Deserialize)]
         struct Head {
@@ -169,10 +166,10 @@ impl Kind {
         }))
     }
 
-    /// A text by its first line without values, and by the line that names its writer.
+    /// The kind of a text, from its first line without values and the line that names its writer.
     fn of_text(content: &[u8]) -> Self {
         let head = &content[..content.len().min(HEAD)];
-        // The first bytes may end within a character.
+        // The first bytes may end inside a character.
         let whole = match std::str::from_utf8(head) {
             Err(error) if error.error_len().is_none() => &head[..error.valid_up_to()],
             _ => head,
@@ -220,10 +217,10 @@ fn plain(line: &str) -> String {
 /// The first bytes of every PNG.
 const PNG_SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// The keyword under which a PNG names what wrote it.
+/// The keyword under which a PNG names its writer.
 pub const SOFTWARE: &str = "Software";
 
-/// What the chunks before the pixels of a PNG state.
+/// Metadata from the chunks before the pixels of a PNG.
 #[derive(Default)]
 struct Png<'a> {
     /// The program that wrote it.
@@ -280,7 +277,7 @@ fn glb_json(content: &[u8]) -> &[u8] {
     &json[..length.min(json.len())]
 }
 
-/// Whether some bytes are within others.
+/// Whether `content` contains `wanted`.
 fn contains(content: &[u8], wanted: &[u8]) -> bool {
     content.windows(wanted.len()).any(|window| window == wanted)
 }

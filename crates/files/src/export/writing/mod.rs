@@ -1,4 +1,4 @@
-//! Files on disk: [`atomic`] writes one, [`staging`] a set, all or none; [`kind`] recognises what is replaced.
+//! Files on disk: [`atomic`] writes one file, [`staging`] a set, all or none; [`kind`] recognises files before they are replaced.
 
 pub mod atomic;
 pub mod kind;

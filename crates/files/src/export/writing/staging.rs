@@ -1,17 +1,14 @@
 //! Staging: a set of files that appears as one.
 //!
-//! All files are first written to a temporary folder beside their final places,
-//! `.deltille-writing-…`, and flushed to the disk. Then the empty file `complete` is added: from
-//! there on the set counts as written. Then each file is moved to its place, and the folder is
-//! removed.
+//! All files are first written to a temporary folder `.deltille-writing-…` beside their final
+//! paths, and flushed to the disk. Then the empty file `complete` is added, after which the set
+//! counts as written. Finally each file is moved to its path, and the folder is removed.
 //!
-//! A process that is killed before `complete` leaves the earlier files; after it all of the new
-//! ones, some of them perhaps still in the temporary folder. [`settle`] finishes the latter and
-//! removes the former; everything that writes to a folder calls it first, and so do readers of
-//! targets and cameras. A lock on the folder serialises those who move files in it; a lock on the
-//! temporary folder distinguishes one in use from one left behind. Systems without locks on folders
-//! (Windows, some network drives) have neither: leftovers stay there, and two runs into one folder
-//! are not serialised.
+//! A process that is killed before `complete` leaves the earlier files unchanged. A process that is killed later leaves all new
+//! files, some perhaps still in the temporary folder. [`settle`] removes incomplete sets and finishes complete ones; all writers to
+//! a folder call it first, and so do readers of targets and cameras. A lock on the folder serialises processes that move files in
+//! it. A lock on the temporary folder distinguishes a folder in use from a leftover. Systems without locks on folders (Windows,
+//! some network drives) have neither: leftovers stay, and two runs into one folder are not serialised.
 
 use std::ffi::OsString;
 use std::fs::{self, File};
@@ -28,12 +25,10 @@ const COMPLETE: &str = "complete";
 /// Name of the folder with the files, inside the temporary one.
 const FILES: &str = "files";
 
-/// A set of files that is being written. Dropped before [`commit`](Self::commit), it leaves nothing
-/// behind.
+/// A set of files that is being written. If it is dropped before [`commit`](Self::commit), nothing is left behind.
 pub struct Staging {
     folder: PathBuf,
-    /// Folders that were created for it, the innermost first; they are removed again if they stay
-    /// empty.
+    /// Folders that were created for it, innermost first; they are removed if they stay empty.
     made: Vec<PathBuf>,
     temporary: Option<TempDir>,
     unfinished: Option<Unfinished>,
@@ -44,7 +39,7 @@ impl Staging {
     /// Begins a set of files in a folder, which is created if necessary.
     ///
     /// # Errors
-    /// When the folder cannot be created or written to, or an earlier set in it cannot be finished.
+    /// Returns an error if the folder cannot be created or written to, or if an earlier set in it cannot be finished.
     pub fn new(folder: &Path) -> io::Result<Self> {
         let missing = folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists());
         let made: Vec<PathBuf> = missing.map(Path::to_owned).collect();
@@ -66,17 +61,16 @@ impl Staging {
         })
     }
 
-    /// The folder in which the files are to be written, each under its final name, with
-    /// [`atomic::write`], which flushes them to the disk.
+    /// The folder for the files. Write each under its final name with [`atomic::write`], which flushes it
+    /// to the disk.
     pub fn files(&self) -> PathBuf {
         self.temporary.as_ref().map(|temporary| temporary.path().join(FILES)).unwrap_or_default()
     }
 
-    /// Moves all files to their final places; an existing file with the same content is left as it
-    /// is.
+    /// Moves all files to their final paths; an existing file with the same content is left unchanged.
     ///
     /// # Errors
-    /// When a file cannot be moved.
+    /// Returns an error if a file cannot be moved.
     pub fn commit(mut self) -> io::Result<()> {
         let Some(temporary) = self.temporary.take() else { return Ok(()) };
         let files = temporary.path().join(FILES);
@@ -91,7 +85,7 @@ impl Staging {
             }
         }
         File::create_new(temporary.path().join(COMPLETE))?.sync_all()?;
-        // From here on the files count as written, and the folder stays until all are moved.
+        // From here on, the files count as written, and the folder stays until all are moved.
         let path = temporary.keep();
         atomic::sync_folder(&path);
         atomic::sync_folder(&self.folder);
@@ -111,11 +105,11 @@ impl Drop for Staging {
     }
 }
 
-/// Finishes or removes what killed processes left in a folder: complete sets are moved to their
-/// places, incomplete ones are removed. Sets that living processes are writing are not touched.
+/// Cleans up the leftovers of killed processes in a folder: complete sets are moved to their final
+/// paths, incomplete ones are removed. Sets of running processes are not touched.
 ///
 /// # Errors
-/// When the folder cannot be read, or a file cannot be moved.
+/// Returns an error if the folder cannot be read, or if a file cannot be moved.
 pub fn settle(folder: &Path) -> io::Result<()> {
     if temporaries(folder).is_empty() {
         return Ok(());
@@ -133,8 +127,8 @@ fn settle_alone(folder: &Path) -> io::Result<()> {
         }
         finish(&path, folder).map_err(|error| {
             let message = format!(
-                "cannot finish what an earlier run left in {}: {error}; remove that folder, or move \
-                 what is in {FILES} to its place",
+                "cannot finish the files of an interrupted run in {}: {error}; remove that folder, or move \
+                 the files in {FILES} to the folder above",
                 path.display()
             );
             io::Error::new(error.kind(), message)
@@ -143,8 +137,8 @@ fn settle_alone(folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Moves the files of a complete set to their places. A killed process may have moved some, and
-/// have removed part of the temporary folder.
+/// Moves the files of a complete set to their final paths. A killed process may have moved some, and
+/// may have removed part of the temporary folder.
 fn finish(temporary: &Path, folder: &Path) -> io::Result<()> {
     let files = temporary.join(FILES);
     let names: Vec<OsString> = match fs::read_dir(&files) {
@@ -153,8 +147,8 @@ fn finish(temporary: &Path, folder: &Path) -> io::Result<()> {
     };
     let places: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
     places.iter().try_for_each(|place| atomic::check_place(place))?;
-    // Freeing a replaced file takes a file system a hundred times as long as a rename; holding it
-    // open defers that until after the last rename.
+    // Freeing a replaced file takes a hundred times longer than a rename. Keeping it open defers
+    // this until after the last rename.
     let open = |place: &PathBuf| File::open(place).ok().filter(|_| cfg!(unix));
     let _replaced: Vec<File> = places.iter().filter_map(open).collect();
     for (name, place) in names.iter().zip(&places) {
@@ -172,7 +166,7 @@ fn temporaries(folder: &Path) -> Vec<PathBuf> {
     named.map(|entry| entry.path()).collect()
 }
 
-/// Whether two files hold the same bytes.
+/// Whether two files contain the same bytes.
 pub fn same_content(one: &Path, other: &Path) -> bool {
     let length = |path: &Path| path.metadata().ok().map(|metadata| metadata.len());
     length(one) == length(other)

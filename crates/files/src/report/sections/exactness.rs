@@ -52,7 +52,7 @@ pub(in crate::report) fn uncertainty(camera: &CameraEstimate) -> String {
         return String::new();
     }
     let drawn = maps.iter().map(|map| (field::uncertainty(camera, map), field::caption(map)));
-    let told = maps.iter().filter_map(|map| {
+    let rows = maps.iter().filter_map(|map| {
         let sd = camera.projection_sd_px(map.distance_mm, map.source)?;
         let source = match map.source {
             Source::Noise => "corner noise",
@@ -68,7 +68,7 @@ pub(in crate::report) fn uncertainty(camera: &CameraEstimate) -> String {
          <p class=\"note\">Standard deviation per axis within the region with corners, after the camera motion that fits the \
          corners best.</p>",
         html::figures(drawn),
-        told.collect::<String>()
+        rows.collect::<String>()
     );
     html::section("Projection uncertainty", &body)
 }

@@ -17,13 +17,15 @@ pub(in crate::report) fn section(camera: &CameraEstimate, tried: &[Candidate]) -
     let worst = tried.iter().filter_map(|one| one.held_out_px).fold(f64::MIN_POSITIVE, f64::max);
     let rows = tried.iter().map(|one| row(camera, one, worst));
     let best = tried.iter().find(|one| one.chosen).map(|one| one.model);
-    let told = match (best, camera.model) {
+    let verdict = match (best, camera.model) {
         (Some(best), Some(own)) if best == own => {
             format!("{own} is the simplest adequate model for this lens.")
         }
         (Some(best), Some(own)) => match tried.iter().find(|one| one.model == own) {
             Some(one) if one.holds => {
-                format!("{own} describes the lens; {best} does so with fewer or better determined parameters.")
+                format!(
+                    "{own} describes the lens; {best} does so with fewer or better determined parameters."
+                )
             }
             Some(_) => format!("{own} was used, but {best} describes the lens better: try it."),
             None => String::new(),
@@ -37,7 +39,7 @@ pub(in crate::report) fn section(camera: &CameraEstimate, tried: &[Candidate]) -
          thirds of a sample of the views and evaluated on the rest, where only poses are estimated. A model with too few parameters has \
          a larger held-out rms; one with too many does not reduce it. The differences (rms and largest) compare projections at infinity with those of \
          the camera of this page, within the region with corners, after the rotation that minimizes them. For the model of this page they show the effect of using fewer views.</p></section>\n",
-        escaped(&told),
+        escaped(&verdict),
         rows.collect::<String>()
     )
 }

@@ -17,16 +17,17 @@ const STRONG: f64 = 0.85;
 pub(in crate::report) fn section(camera: &CameraEstimate) -> String {
     if let Lens::Spline(spline) = &camera.camera.lens {
         let SplineGrid { degree, columns, rows, fov_x_deg } = spline.grid();
-        let told = format!(
+        let text = format!(
             "<p>The lens is a spline of degree {degree} with {columns} × {rows} knots over a horizontal field of view of {fov_x_deg}°. \
              Individual knots have no physical meaning: see the projection uncertainty instead.</p>"
         );
-        return html::section("Parameters", &told);
+        return html::section("Parameters", &text);
     }
-    let told = |(p, _): &(&Parameter, Option<f64>)| p.sd.is_some() || p.value != 0.0;
+    let is_shown = |(p, _): &(&Parameter, Option<f64>)| p.sd.is_some() || p.value != 0.0;
     let is_observed = camera.covariance_from(Source::Observed).is_some();
     let (mut names, mut columns) = (Vec::new(), [Vec::new(), Vec::new(), Vec::new()]);
-    for (parameter, observed) in camera.parameters.iter().zip(camera.observed_sd()).filter(told) {
+    for (parameter, observed) in camera.parameters.iter().zip(camera.observed_sd()).filter(is_shown)
+    {
         let (value, sd) = rounded(parameter.value, parameter.sd);
         let observed = observed.map(|_| rounded(parameter.value, observed).1);
         names.push(escaped(&parameter.name));

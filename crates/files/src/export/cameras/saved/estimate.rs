@@ -10,8 +10,9 @@ use glam::{DVec2, DVec3};
 
 use super::error::SavedError;
 use super::record::{
-    Fit, Rig, RigHeldOut, SavedCamera, SavedCorner, SavedExcluded, SavedFrame, SavedMap, SavedOffset,
-    SavedPose, SavedProjection, SavedSeen, SavedShape, SavedView, Single, SingleHeldOut,
+    Fit, Rig, RigHeldOut, SavedCamera, SavedCorner, SavedExcluded, SavedFrame, SavedMap,
+    SavedOffset, SavedPose, SavedProjection, SavedSeen, SavedShape, SavedView, Single,
+    SingleHeldOut,
 };
 
 /// The target that was photographed, if it is known.

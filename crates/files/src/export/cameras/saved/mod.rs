@@ -71,6 +71,6 @@ pub fn failures(text: &str) -> Vec<String> {
     }
     let saved = serde_json::from_str::<SavedDiagnoses>(text);
     let diagnoses = saved.map(|saved| saved.diagnoses).unwrap_or_default();
-        let failures = diagnoses.into_iter().filter(|found| calibration::is_failure(&found.kind));
-        failures.map(|found| found.text).collect()
+    let failures = diagnoses.into_iter().filter(|found| calibration::is_failure(&found.kind));
+    failures.map(|found| found.text).collect()
 }

@@ -1,5 +1,5 @@
-//! `.dsc` target descriptions, as the reference detector and its fork read them
-//! (`docs/formats.md`, “.dsc target descriptions”).
+//! `.dsc` target descriptions in the format of the reference detector and its fork (`docs/formats.md`, “.dsc target
+//! descriptions”).
 //!
 //! ```text
 //! 0,15,10,20.0                      board id, A, B, edge
@@ -9,7 +9,7 @@
 //! …                                 and so on, board after board
 //! ```
 //!
-//! Two dialects differ in what A and B count, in the names of families and in units:
+//! Two dialects differ in the meaning of A and B, in the names of families and in units:
 //!
 //! | | original | fork |
 //! |---|---|---|
@@ -28,15 +28,14 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The reader accepts either dialect, spaces around commas, CRLF, a missing final newline, and
-//! coordinates in the unit of the edge, in cm with the edge in mm, or in m with the edge in cm or
-//! mm; it infers the unit from the distance of neighbouring corners.
+//! The reader accepts either dialect, spaces around commas, CRLF and a missing final newline. Coordinates may be in the unit of
+//! the edge, in cm with the edge in mm, or in m with the edge in cm or mm; the reader infers the unit from the distance of
+//! neighbouring corners.
 //!
-//! Limits: the original dialect cannot describe outlines other than the triangle, and neither
-//! dialect untagged or inverted boards, or tags in white squares. Of square tags this crate has
-//! aprilTag16h5, 25h9 and 36h11; other families have no fingerprint here. The original program
-//! reads triangular tags with code tables of square ones, so that it indexes such boards by its own
-//! codes only.
+//! Limits: the original dialect describes only triangular outlines. Neither dialect describes untagged or inverted boards, or
+//! tags in white squares. Of square tags, this crate has aprilTag16h5, 25h9 and 36h11; other families have no fingerprint here.
+//! The original program reads triangular tags with the code tables of square tags, so it indexes such boards only by its own
+//! codes.
 
 mod read;
 mod write;
@@ -50,7 +49,7 @@ pub use write::write;
 use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::targets::{ListFormat, ListedSpec, Panel, Target, TargetSpec};
 
-/// The dialect of a file, by the program that reads it.
+/// The dialect of a file, named after the program that reads it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Dialect {
@@ -62,7 +61,7 @@ pub enum Dialect {
 }
 
 impl Dialect {
-    /// The dialect from which a target was read; that of the fork for all other targets.
+    /// The dialect from which a target was read; the fork's dialect for all other targets.
     pub fn of(target: &Target) -> Self {
         let original = ListedSpec { format: ListFormat::DscOriginal };
         if target.spec == TargetSpec::Listed(original) { Dialect::Original } else { Dialect::Fork }
@@ -90,7 +89,7 @@ impl FromStr for Dialect {
     }
 }
 
-/// Why a `.dsc` cannot be read or written.
+/// Error of reading or writing a `.dsc`.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DscError {
@@ -99,10 +98,10 @@ pub enum DscError {
     Line {
         /// Counted from 1.
         line: usize,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
-    /// The boards do not make a valid target.
+    /// The boards are not a valid target.
     #[error("{0}")]
     Target(String),
     /// The dialect cannot describe the target.
@@ -112,15 +111,15 @@ pub enum DscError {
         dialect: Dialect,
         /// Name of the target.
         name: String,
-        /// Why not, and what to do.
+        /// The reason and the remedy.
         reason: String,
     },
 }
 
-/// Names of families without their prefix; all programs know these and no others.
+/// Names of the families without their prefix; the programs support only these.
 const FAMILIES: [&str; 5] = ["16h5", "25h7", "25h9", "36h9", "36h11"];
 
-/// The index of a corner in `.orpc` files: its place in the matrix of the panel, row by row.
+/// The index of a corner in `.orpc` files: its position in the matrix of the panel, row by row.
 ///
 /// Rows of rectangular boards are counted from the top in the original dialect.
 pub fn point_id(panel: &Panel, dialect: Dialect, corner: Vertex) -> i64 {

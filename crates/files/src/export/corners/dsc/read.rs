@@ -14,33 +14,33 @@ use deltille_core::targets::{
 };
 use deltille_core::words::{counted, quoted};
 
-/// Most boards in a file, and most columns or rows of one: a larger number is a typing error.
+/// Maximum number of boards in a file, and of columns or rows of a board: a larger number is a typing error.
 const MOST: u32 = 10_000;
 
-/// Relative tolerance of the unit that the distances of corners suggest.
+/// Relative tolerance of the unit inferred from the distances of corners.
 const UNIT_SLACK: f64 = 0.02;
 
-/// Units of a file: units of the coordinates in one unit of the edge, and both units in mm.
+/// Units of a file: number of coordinate units per edge unit, and both units in mm.
 type Units = (f64, [f64; 2]);
 
-/// Edge and coordinates: mm and mm, mm and cm, cm and m, mm and m.
+/// Units of edge and coordinates: mm and mm, mm and cm, cm and m, mm and m.
 const KNOWN: [Units; 4] =
     [(1.0, [1.0, 1.0]), (10.0, [1.0, 10.0]), (100.0, [10.0, 1e3]), (1e3, [1.0, 1e3])];
 
-/// Reads the text of a `.dsc` file in either dialect as a target with the given name. Corner ids
-/// are counted through the file by board, row and column; lengths are converted to mm.
+/// Reads the text of a `.dsc` file in either dialect as a target with the given name. Corner ids are
+/// assigned consecutively by board, row and column; lengths are converted to mm.
 ///
 /// # Errors
-/// When a line is not valid, the boards do not make a valid target, or units cannot be inferred.
+/// Returns an error if a line is not valid, the boards are not a valid target, or units cannot be inferred.
 pub fn read(text: &str, name: &str) -> Result<Target, DscError> {
     read_in(text, name, &KNOWN)
 }
 
-/// Reads the text of a `.dsc` file whose lengths must all be in millimetres, as
-/// [`write`](super::write) writes them.
+/// Reads the text of a `.dsc` file with all lengths in millimetres, as written by
+/// [`write`](super::write).
 ///
 /// # Errors
-/// When a line is not valid, the boards do not make a valid target, or lengths are in another unit.
+/// Returns an error if a line is not valid, the boards are not a valid target, or lengths are in another unit.
 pub fn read_in_mm(text: &str, name: &str) -> Result<Target, DscError> {
     read_in(text, name, &KNOWN[..1])
 }
@@ -65,7 +65,7 @@ fn read_in(text: &str, name: &str, units: &[Units]) -> Result<Target, DscError> 
     })?;
     let family = first.family.clone();
     if let Some(other) = blocks.iter().find(|block| block.family != family) {
-        let problem = format!("the family is {} here and {family} above", other.family);
+        let problem = format!("the family is {} here, but {family} above", other.family);
         return Err(other.head.fault(problem));
     }
     blocks.sort_by_key(|block| block.id);
@@ -84,7 +84,7 @@ fn read_in(text: &str, name: &str, units: &[Units]) -> Result<Target, DscError> 
         .map_err(|(field, problem)| DscError::Target(format!("{field}: {problem}")))
 }
 
-/// The family by its name in this crate, with its fingerprint where the crate has its codes.
+/// The family by its name in this crate, with its fingerprint if the crate has its codes.
 fn family_ref(name: &str, blocks: &[Block]) -> Result<FamilyRef, DscError> {
     let Ok(family) = Family::shipped(name) else {
         return Ok(FamilyRef { name: name.to_owned(), fingerprint: String::new(), squares: None });
@@ -92,7 +92,7 @@ fn family_ref(name: &str, blocks: &[Block]) -> Result<FamilyRef, DscError> {
     for block in blocks {
         for corner in &block.corners {
             if corner.tag.is_some_and(|tag| tag as usize >= family.len()) {
-                let problem = format!("{name} has no more than {}", counted(family.len(), "code"));
+                let problem = format!("{name} has only {}", counted(family.len(), "code"));
                 return Err(corner.line.fault(problem));
             }
         }
@@ -112,7 +112,7 @@ impl<'a> Line<'a> {
         DscError::Line { line: self.number, problem: problem.into() }
     }
 
-    /// The comma-separated fields, of which there must be `N`.
+    /// Returns the comma-separated fields, which must be `N`.
     fn fields<const N: usize>(self, form: &str) -> Result<[&'a str; N], DscError> {
         let fields: Vec<&str> = self.text.split(',').map(str::trim).collect();
         fields.try_into().map_err(|_| self.fault(format!("{} is not `{form}`", quoted(self.text))))
@@ -121,7 +121,7 @@ impl<'a> Line<'a> {
     fn number<T: std::str::FromStr>(self, field: &str, what: &str) -> Result<T, DscError> {
         field
             .parse()
-            .map_err(|_| self.fault(format!("{what} {} is not such a number", quoted(field))))
+            .map_err(|_| self.fault(format!("{what} {} is not a valid number", quoted(field))))
     }
 
     fn within(self, field: &str, what: &str, range: Range) -> Result<f64, DscError> {
@@ -162,13 +162,15 @@ impl<'a> Block<'a> {
             return Err(head.fault(format!("A and B must be at most {MOST}")));
         }
         let Some(second) = lines.get(1) else {
-            return Err(head.fault("the file ends after it: a line `family,border` must follow"));
+            return Err(
+                head.fault("the file ends after this line: expected a line `family,border`")
+            );
         };
         let [family, border] = second.fields("family,border")?;
         let border = second.within(border, "border", border_bits::RANGE)?;
         let (family, dialect, kind) = family_of(family, b).ok_or_else(|| {
             let names = FAMILIES.map(|f| format!("delTag{f}, aprilTag{f}, t{f}")).join(", ");
-            second.fault(format!("family {} is none of {names}", quoted(family)))
+            second.fault(format!("unknown family {} (known: {names})", quoted(family)))
         })?;
         let matrix = match (dialect, kind) {
             (Dialect::Fork, _) => [a, b],
@@ -187,7 +189,7 @@ impl<'a> Block<'a> {
         };
         if let Some(expected) = expected.filter(|&n| n as usize != corners.len()) {
             let problem = format!(
-                "board {id} must list {}, not {}: the file is cut off, or A and B are not those of \
+                "board {id} must list {}, not {}: the file is truncated, or A and B are not in \
                  the original dialect",
                 counted(expected as usize, "corner"),
                 corners.len()
@@ -200,7 +202,7 @@ impl<'a> Block<'a> {
         Ok((Self { head, id, dialect, kind, matrix, size, family, border, corners }, after))
     }
 
-    /// The board as a panel, its corners numbered from `next_id`.
+    /// The board as a panel, with corners numbered from `next_id`.
     fn panel(&self, next_id: &mut u32, units: &[Units]) -> Result<Panel, DscError> {
         let mut by_vertex = BTreeMap::new();
         for corner in &self.corners {
@@ -248,13 +250,13 @@ impl<'a> Block<'a> {
             }
         }
         panel.pose = PanelPose::fit(&panel.corners).ok_or_else(|| {
-            let problem = format!("the corners of board {} lie on one line", self.id);
+            let problem = format!("the corners of board {} are collinear", self.id);
             self.head.fault(problem)
         })?;
         Ok(panel)
     }
 
-    /// The edge in mm, and how many mm the unit of the coordinates has.
+    /// The edge in mm, and the unit of the coordinates in mm.
     fn units(
         &self,
         corners: &BTreeMap<Vertex, &ListedCorner>,
@@ -269,14 +271,14 @@ impl<'a> Block<'a> {
             })
             .collect();
         let Some(step) = median(steps) else {
-            return Err(self.head.fault("no two corners of a row are neighbours"));
+            return Err(self.head.fault("no row has two neighbouring corners"));
         };
         let ratio = self.size / step;
         let unit = known.iter().find(|(r, _)| (ratio / r - 1.0).abs() < UNIT_SLACK);
         let (_, [edge, unit]) = unit.ok_or_else(|| {
             let problem = format!(
-                "board {}: the size is {} and neighbouring corners are {step} apart; no units of \
-                 length explain that",
+                "board {}: the size is {}, but neighbouring corners are {step} apart; no units of \
+                 length explain this",
                 self.id, self.size
             );
             self.head.fault(problem)
@@ -297,7 +299,9 @@ impl<'a> ListedCorner<'a> {
         }
         let tag = match tag {
             -1 => None,
-            tag => Some(u32::try_from(tag).map_err(|_| line.fault(format!("{tag} is no tag")))?),
+            tag => {
+                Some(u32::try_from(tag).map_err(|_| line.fault(format!("{tag} is not a tag id")))?)
+            }
         };
         let position = [("x", x), ("y", y), ("z", z)];
         let [x, y, z] = position.map(|(what, field)| line.within(field, what, place_mm::RANGE));
@@ -306,7 +310,7 @@ impl<'a> ListedCorner<'a> {
     }
 }
 
-/// Family name as this crate has it, dialect and tiling, from the name in the file and B.
+/// Family name in this crate, dialect and tiling, from the name in the file and B.
 fn family_of(name: &str, b: u32) -> Option<(String, Dialect, GridKind)> {
     let known = |rest: &str| FAMILIES.contains(&rest);
     if name.strip_prefix("delTag").is_some_and(known) {

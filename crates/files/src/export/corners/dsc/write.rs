@@ -9,10 +9,10 @@ use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::setting::Setting::{DialectFork, TagFamily, TagsInBlack};
 use deltille_core::targets::{Panel, TagsIn, Target};
 
-/// The text of the `.dsc` file of a target; positions are in the target frame, mm.
+/// Returns the text of the `.dsc` file of a target; positions are in the target frame, mm.
 ///
 /// # Errors
-/// When the dialect cannot describe the target.
+/// Returns an error if the dialect cannot describe the target.
 pub fn write(target: &Target, dialect: Dialect) -> Result<String, DscError> {
     let refused = |reason: &str| DscError::Refused {
         dialect,
@@ -20,17 +20,17 @@ pub fn write(target: &Target, dialect: Dialect) -> Result<String, DscError> {
         reason: reason.to_owned(),
     };
     if target.tilings().count() > 1 {
-        return Err(refused("its tags are of two families, and the format has one"));
+        return Err(refused("its tags are of two families, but the format supports one"));
     }
     let name = target.family.as_ref().map(|family| family.name.as_str());
-    let name = name.ok_or_else(|| refused("the format needs tags, and the board has none"))?;
+    let name = name.ok_or_else(|| refused("the format needs tags, but the board has none"))?;
     let known = FAMILIES.iter().find(|&known| {
         name.strip_prefix("delTag") == Some(known) || name.strip_prefix("aprilTag") == Some(known)
     });
     let known = known.ok_or_else(|| {
         let names = FAMILIES.map(|f| format!("delTag{f}"));
         refused(&format!(
-            "its readers have the codes of {} only, not those of {name}: choose one of them with \
+            "its readers have only the codes of {}, not those of {name}: choose one of them with \
              {TagFamily}",
             names.join(", ")
         ))
@@ -42,11 +42,11 @@ pub fn write(target: &Target, dialect: Dialect) -> Result<String, DscError> {
     let mut text = String::new();
     for panel in &target.panels {
         if panel.inverted {
-            return Err(refused("its readers look for black tags, and the board is inverted"));
+            return Err(refused("its readers search for black tags, but the board is inverted"));
         }
         if panel.tags_in == TagsIn::White {
             return Err(refused(&format!(
-                "its readers look for tags in black squares: take {TagsInBlack}"
+                "its readers search for tags in black squares: use {TagsInBlack}"
             )));
         }
         let [a, b] = header(panel, dialect).map_err(|reason| refused(&reason))?;
@@ -83,7 +83,7 @@ fn header(panel: &Panel, dialect: Dialect) -> Result<[u32; 2], String> {
                 Ok([side as u32 + 2, 0])
             } else {
                 Err(format!(
-                    "it knows triangular boards with an equilateral outline only; use {DialectFork}"
+                    "triangular boards must have an equilateral outline; use {DialectFork}"
                 ))
             }
         }

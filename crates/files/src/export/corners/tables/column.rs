@@ -2,16 +2,16 @@
 
 use parquet::data_type::ByteArray;
 
-/// What a column holds.
+/// The type of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// UTF-8.
     Text,
-    /// A whole number of 32 bits, with a sign.
+    /// A signed integer of 32 bits.
     Signed,
-    /// The same without.
+    /// An unsigned integer of 32 bits.
     Unsigned,
-    /// A number of double precision.
+    /// A double-precision number.
     Real,
     /// True or false.
     Flag,
@@ -24,9 +24,9 @@ pub(super) struct Column {
     pub kind: Kind,
     /// Whether every row has a value.
     pub full: bool,
-    /// Whether values repeat, so that a dictionary of them is shorter.
+    /// Whether values repeat, so a dictionary is shorter.
     pub repeats: bool,
-    /// Whether the table is not read without it.
+    /// Whether the reader requires it.
     pub needed: bool,
 }
 
@@ -45,17 +45,17 @@ const fn column(name: &'static str, kind: Kind) -> Column {
 }
 
 impl Column {
-    /// With rows that have no value.
+    /// Allows rows without a value.
     const fn gaps(self) -> Self {
         Self { full: false, ..self }
     }
 
-    /// With values that do not repeat.
+    /// Marks values that do not repeat.
     const fn varied(self) -> Self {
         Self { repeats: false, ..self }
     }
 
-    /// For those who look at the table; it is read without, too.
+    /// Marks a column for users of the table; the reader does not require it.
     const fn extra(self) -> Self {
         Self { needed: false, ..self }
     }
@@ -82,7 +82,7 @@ pub(super) const CORNERS: [Column; 17] = [
     column("target_z_mm", Kind::Real).gaps().extra(),
 ];
 
-/// A row for each picture.
+/// A row for each image.
 pub(super) const PICTURES: [Column; 25] = [
     column("image", Kind::Text),
     column("width", Kind::Signed).gaps(),

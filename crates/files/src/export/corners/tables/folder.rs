@@ -1,4 +1,4 @@
-//! Which files of a folder are tables, and what they hold together.
+//! Finds the tables in a folder and reads them together.
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
@@ -8,7 +8,7 @@ use std::{fs, io};
 use super::{CORNERS, Contents, EXTENSION, PICTURES, Read, Reader, TableError};
 use crate::limits::{Limits, ReadError};
 
-/// Why files of tables cannot be read.
+/// Error of reading files of tables.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FolderError {
@@ -17,40 +17,40 @@ pub enum FolderError {
     Folder {
         /// The folder.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: io::Error,
     },
     /// A file cannot be read, or is too large.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// A file is no such table.
+    /// A file is not a valid table.
     #[error("{}: {source}", path.display())]
     Table {
-        /// The file; of what several contradict each other in, the first.
+        /// The file; the first one if several contradict each other.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         source: TableError,
     },
-    /// One of the two tables is not there.
-    #[error("{}: the table of {lacks} is not beside it: give both, or their folder", path.display())]
+    /// One of the two tables is missing.
+    #[error("{}: the `{lacks}` table is missing: give both files or their folder", path.display())]
     Alone {
-        /// A file of the other.
+        /// A file of the other table.
         path: PathBuf,
-        /// Which is not there.
+        /// The missing table.
         lacks: &'static str,
     },
 }
 
-/// Whether a file is named like a table.
+/// Whether a file has the name of a table.
 pub fn is_named(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(EXTENSION))
 }
 
-/// The tables of a folder: files in it, and in folders of the tables' names. A file of corners there has a file of
-/// pictures of the same name, or was left by a run that did not come to write that.
+/// Returns the tables of a folder: files in it, and in subfolders with the names of the tables. A file of corners in a subfolder
+/// has a file of images with the same name, unless it was left behind by an interrupted run.
 ///
 /// # Errors
-/// When a folder cannot be listed.
+/// Returns an error if a folder cannot be listed.
 pub fn files(folder: &Path) -> Result<Vec<PathBuf>, FolderError> {
     let mut files = named_in(folder)?;
     let [corners, pictures] = [CORNERS, PICTURES].map(|table| folder.join(table));
@@ -67,7 +67,7 @@ pub fn files(folder: &Path) -> Result<Vec<PathBuf>, FolderError> {
     Ok(files)
 }
 
-/// The files in a folder that are named like tables, in the order of their names.
+/// The files in a folder with names of tables, sorted by name.
 fn named_in(folder: &Path) -> Result<Vec<PathBuf>, FolderError> {
     let broken = |source| FolderError::Folder { path: folder.to_owned(), source };
     let mut files = Vec::new();
@@ -82,7 +82,7 @@ fn named_in(folder: &Path) -> Result<Vec<PathBuf>, FolderError> {
     Ok(files)
 }
 
-/// The file of the other table beside one: `pictures` where it says `corners`, or the other way round.
+/// The path of the other table: `pictures` in place of `corners`, or vice versa.
 pub fn beside(path: &Path) -> Option<PathBuf> {
     let name = path.file_name()?.to_str()?;
     let swapped =
@@ -94,7 +94,7 @@ pub fn beside(path: &Path) -> Option<PathBuf> {
 /// Reads tables from their files.
 ///
 /// # Errors
-/// When a file cannot be read or is no such table, or when one of the two tables is not among them.
+/// Returns an error if a file cannot be read or is not a valid table, or if one of the two tables is missing.
 pub fn read(files: &[PathBuf], limits: &Limits) -> Result<Read, FolderError> {
     let wrong = |path: &Path| {
         let path = path.to_owned();

@@ -1,10 +1,10 @@
-//! Detections of many pictures as two tables in Parquet, and back: `corners`, a row for each corner, and
-//! `pictures`, a row for each picture (`docs/formats.md`, “Tables”).
+//! Detections of many images as two Parquet tables, and back: `corners`, with a row for each corner, and
+//! `pictures`, with a row for each image (`docs/formats.md`, “Tables”).
 //!
-//! Everything that a calibration needs of detections is in them. What they leave out is in the JSON of a
-//! [detection](super::detection): the tags one by one, and how long each stage took.
+//! They contain all that a calibration needs. Individual tags and the duration of each stage are only in the JSON of a
+//! [detection](super::detection).
 //!
-//! `column` is their schema, `write` and `read` are its two directions; `pages` checks what a file promises before it is unpacked, and
+//! `column` is the schema, and `write` and `read` use it. `pages` checks the stated sizes of a file before it is unpacked, and
 //! `folder` finds the tables of a folder.
 //!
 //! ```
@@ -37,32 +37,32 @@ use crate::limits::Exceeded;
 pub use read::{Contents, Read, Reader};
 pub use write::Writer;
 
-/// File names of the two tables in a folder, without their ending.
+/// File names of the two tables in a folder, without extension.
 pub const CORNERS: &str = "corners";
 /// See [`CORNERS`].
 pub const PICTURES: &str = "pictures";
-/// The ending of both.
+/// The extension of both.
 pub const EXTENSION: &str = "parquet";
 
-/// The key under which a table's file names its schema, and the schemas with their versions. Tables that other
-/// programs wrote have none and are known by their columns.
+/// The key under which the file of a table names its schema, and the schemas with their versions. Tables of other
+/// programs have no schema and are recognised by their columns.
 const SCHEMA: &str = "deltille.schema";
 const CORNERS_SCHEMA: &str = "deltille/corners/1";
 const PICTURES_SCHEMA: &str = "deltille/pictures/1";
 
-/// What came of a picture.
+/// The result of an image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// Its name, by which corners and pictures are joined; no two of a table have the same.
+    /// Its name, unique in a table, by which corners and images are joined.
     pub image: String,
-    /// How many tags were read in it.
+    /// Number of tags that were read in it.
     pub tags: u32,
-    /// What was found, without tags; or in words why the picture could not be read.
+    /// The detection without tags, or the reason why the image could not be read.
     pub found: Result<Detection, String>,
 }
 
 impl Picture {
-    /// The picture of a detection.
+    /// The result of an image with a detection.
     pub fn of(found: &Detection) -> Self {
         let mut found = found.clone();
         let tags = found.grids.iter().map(|grid| grid.tags.len()).sum::<usize>();
@@ -71,63 +71,63 @@ impl Picture {
         Self { image: found.image.clone(), tags: tags as u32, found: Ok(found) }
     }
 
-    /// A picture that could not be read, and why.
+    /// The result of an image that could not be read, with the reason.
     pub fn unread(image: impl Into<String>, why: impl Into<String>) -> Self {
         Self { image: image.into(), tags: 0, found: Err(why.into()) }
     }
 }
 
-/// Why a table cannot be read or written.
+/// Error of reading or writing a table.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TableError {
     /// The file could not be written.
     #[error("{0}")]
     Write(String),
-    /// The file is no Parquet, or damaged.
-    #[error("not a Parquet file that can be read: {0}")]
+    /// The file is not Parquet, or is damaged.
+    #[error("not a readable Parquet file: {0}")]
     File(String),
-    /// The file holds another table.
+    /// The file contains another table.
     #[error(
-        "neither a table of corners nor one of pictures: it has no column `{0}`; give what \
+        "neither a `corners` nor a `pictures` table: it has no column `{0}`; use the files that \
          `deltille detect --format parquet` wrote"
     )]
     Other(&'static str),
     /// The table has another version.
-    #[error("its schema is `{found}`, this version reads `{reads}`: make the file anew")]
+    #[error("its schema is `{found}`, but this version reads `{reads}`: make the file again")]
     Schema {
         /// The schema that the file names.
         found: String,
-        /// The one that is read.
+        /// The schema that this version reads.
         reads: &'static str,
     },
     /// The table needs more memory than the limits allow.
     #[error(transparent)]
     Exceeded(#[from] Exceeded),
-    /// A column is missing, or holds something else.
+    /// A column is missing or has another type.
     #[error("column `{column}`: {problem}")]
     Column {
         /// The column.
         column: &'static str,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
-    /// A value is missing or not in its range.
+    /// A value is missing or out of range.
     #[error("row {row}, column `{column}`: {problem}")]
     Cell {
-        /// The row, from 1 on.
+        /// The row, counted from 1.
         row: u64,
         /// The column.
         column: &'static str,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
-    /// The rows of a picture contradict each other.
-    #[error("picture {image}: {problem}")]
+    /// The rows of an image contradict each other.
+    #[error("image {image}: {problem}")]
     Picture {
-        /// The picture.
+        /// The image.
         image: String,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
 }

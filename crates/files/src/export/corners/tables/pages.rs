@@ -1,20 +1,20 @@
-//! Headers of pages, looked at before anything is unpacked: what they promise is what a reader sets aside.
+//! Checks of page headers before anything is unpacked, because a reader allocates the stated sizes.
 //!
-//! A page begins with a struct in Thrift's compact protocol: its kind, its sizes unpacked and packed, and of its
-//! kind how many values it holds and how they are encoded.
+//! A page begins with a struct in Thrift's compact protocol: its kind, its unpacked and packed sizes, and, depending on the
+//! kind, the number of values and their encoding.
 
-/// Depth to which structs of a header may be nested; a good one has three.
+/// Maximum nesting depth of structs in a header; valid headers have three levels.
 const MOST_DEPTH: u32 = 8;
 
-/// Encodings that are read: their decoders set aside no more than a page holds. Those that begin with a count of
-/// differences do.
+/// Supported encodings: their decoders allocate no more than the size of the page. Encodings that begin with a count of
+/// differences may allocate more.
 const PLAIN: i64 = 0;
 const PLAIN_DICTIONARY: i64 = 2;
 const RLE: i64 = 3;
 const RLE_DICTIONARY: i64 = 8;
 const BYTE_STREAM_SPLIT: i64 = 9;
 
-/// What the header of a page says.
+/// The header of a page.
 #[derive(Default)]
 struct Header {
     unpacked: i64,
@@ -24,8 +24,8 @@ struct Header {
     is_dictionary: bool,
 }
 
-/// Bytes of all pages of a column's part of a file once they are unpacked; `Err` says what is wrong with a page.
-/// No dictionary may have more than `most_entries`.
+/// Returns the unpacked size of all pages of a column chunk, bytes; an error describes the problem of a page. No dictionary may
+/// have more than `most_entries`.
 pub(super) fn unpacked_bytes(mut chunk: &[u8], most_entries: u64) -> Result<u64, String> {
     let mut all = 0;
     while !chunk.is_empty() {
@@ -37,12 +37,13 @@ pub(super) fn unpacked_bytes(mut chunk: &[u8], most_entries: u64) -> Result<u64,
             header.encoding,
             PLAIN | PLAIN_DICTIONARY | RLE | RLE_DICTIONARY | BYTE_STREAM_SPLIT
         ) {
-            return Err("values are encoded as differences; write them plain or with a dictionary"
-                .to_owned());
+            return Err(
+                "values are delta-encoded; write them plain or with a dictionary".to_owned()
+            );
         }
-        // Every value of a dictionary takes a byte at least.
+        // Every value of a dictionary takes at least one byte.
         if header.is_dictionary && size(header.values)? > unpacked.min(most_entries) {
-            return Err("a dictionary promises more values than it has".to_owned());
+            return Err("a dictionary states more values than it has".to_owned());
         }
         all += unpacked;
         let rest = usize::try_from(packed).ok().and_then(|packed| chunk.get(packed..));
@@ -59,7 +60,7 @@ fn header(bytes: &mut &[u8]) -> Option<Header> {
         match (field, kind) {
             (2, I32) => header.unpacked = number(bytes)?,
             (3, I32) => header.packed = number(bytes)?,
-            // Pages of data, a dictionary, and pages of data in their second version.
+            // Data pages, dictionary pages, and data pages of version 2.
             (5 | 7 | 8, STRUCT) => {
                 header.is_dictionary = field == 7;
                 let encoding_at = if field == 8 { 4 } else { 2 };
@@ -89,7 +90,7 @@ const LIST: u8 = 9;
 const SET: u8 = 10;
 const STRUCT: u8 = 12;
 
-/// The kind of the next field of a struct, whose number is told too; `Some(None)` at its end.
+/// Reads the kind of the next field of a struct and updates its number; `Some(None)` at the end.
 fn next_field(bytes: &mut &[u8], field: &mut i64) -> Option<Option<u8>> {
     let head = byte(bytes)?;
     if head == 0 {
@@ -119,7 +120,7 @@ fn skip(bytes: &mut &[u8], kind: u8, depth: u32) -> Option<()> {
             let head = byte(bytes)?;
             let count = if head >> 4 == 15 { varint(bytes)? } else { u64::from(head >> 4) };
             for _ in 0..count {
-                // Flags in a list have a byte each.
+                // Flags in a list take one byte each.
                 let kind = if head & 15 <= FALSE { BYTE } else { head & 15 };
                 skip(bytes, kind, depth + 1)?;
             }
@@ -153,7 +154,7 @@ fn varint(bytes: &mut &[u8]) -> Option<u64> {
     None
 }
 
-/// A whole number with its sign in the last bit.
+/// An integer with its sign in the last bit (zigzag).
 fn number(bytes: &mut &[u8]) -> Option<i64> {
     let value = varint(bytes)?;
     Some((value >> 1) as i64 ^ -((value & 1) as i64))
@@ -163,7 +164,7 @@ fn number(bytes: &mut &[u8]) -> Option<i64> {
 mod tests {
     use super::*;
 
-    /// A page of data whose header has these sizes.
+    /// A data page whose header states these sizes.
     fn page(unpacked: u32, packed: u32, field: u8, values: u32, encoding: u8) -> Vec<u8> {
         let varint = |value: u32| {
             let mut value = u64::from(value) << 1;
@@ -189,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_are_known_before_anything_is_unpacked() {
+    fn sizes_are_checked_before_unpacking() {
         let two = [page(100, 7, 5, 9, 0), page(2_000_000_000, 20, 5, 9, 0)].concat();
         assert_eq!(unpacked_bytes(&two, 10), Ok(2_000_000_100));
         assert!(unpacked_bytes(&two[..40], 10).unwrap_err().contains("too soon"));

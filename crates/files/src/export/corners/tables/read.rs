@@ -1,4 +1,4 @@
-//! Reading of tables, by this program or by others written, some rows at a time.
+//! Reader of tables written by this or other programs, some rows at a time.
 
 use std::collections::{BTreeMap, HashMap};
 use std::str;
@@ -26,62 +26,62 @@ use deltille_core::quantity::Range;
 use deltille_core::raster::FileNotes;
 use deltille_core::targets::TargetIdentity;
 
-/// Rows that are decoded at a time.
+/// Number of rows decoded at a time.
 const BATCH: usize = 4096;
 
-/// What a row takes in memory, about, bytes. A file may have it in less, where values repeat.
+/// Approximate memory of a row, bytes. Repeated values take less in a file.
 const BYTES_PER_CORNER: u64 = 32;
 const BYTES_PER_PICTURE: u64 = 200;
 
-/// Most bytes of a text, such as the path of a picture.
+/// Maximum size of a text, for example the path of an image, bytes.
 const MOST_TEXT: usize = 10_000;
 
-/// Which table a file holds.
+/// The table that a file contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Contents {
     /// A row for each corner.
     Corners,
-    /// A row for each picture.
+    /// A row for each image.
     Pictures,
 }
 
-/// Reads tables, each of which may be in several files, in any order.
+/// Reads tables. Each may consist of several files, in any order.
 pub struct Reader {
     limits: Limits,
     index: HashMap<String, usize>,
     seen: Vec<Seen>,
 }
 
-/// What tables hold.
+/// The content of tables.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Read {
-    /// The pictures, in the order in which they came first.
+    /// The images, in the order of their first occurrence.
     pub pictures: Vec<Picture>,
-    /// How many pictures have fewer corners than their table says.
+    /// Number of images with fewer corners than their table states.
     pub short: usize,
 }
 
-/// What was read of a picture.
+/// The data of an image read so far.
 struct Seen {
     image: String,
     picture: Option<Picture>,
-    /// Its corners as the table of pictures counts them.
+    /// Its number of corners in the `pictures` table.
     corners: Option<u32>,
     grids: BTreeMap<u32, Grid>,
 }
 
 impl Reader {
-    /// A reader without tables. No file may have more than [`Limits::max_bytes`], as it is and unpacked.
+    /// Creates a reader without tables. No file may exceed [`Limits::max_bytes`], packed or unpacked.
     pub fn new(limits: Limits) -> Self {
         Self { limits, index: HashMap::new(), seen: Vec::new() }
     }
 
-    /// Reads a file of a table, and says which table it is.
+    /// Reads a file of a table and returns which table it is.
     ///
     /// # Errors
-    /// When it is no such table, is damaged, or needs more memory than the limits allow.
+    /// Returns an error if the file is not a valid table, is damaged, or needs more memory than the limits allow.
     pub fn add(&mut self, content: Vec<u8>) -> Result<Contents, TableError> {
-        // The reader of Parquet checks much and not all.
+        // The Parquet reader does not check everything, so it may panic.
         limits::caught(|| self.add_file(Bytes::from(content)))
             .unwrap_or_else(|broken: Broken| Err(TableError::File(broken.to_string())))
     }
@@ -139,9 +139,9 @@ impl Reader {
         Ok(contents)
     }
 
-    /// The picture of a name.
+    /// The image with the given name.
     fn seen(&mut self, image: &str, budget: &mut Budget) -> Result<&mut Seen, TableError> {
-        // Rows of a picture come one after the other.
+        // Rows of an image are usually consecutive.
         let last = self.seen.len().checked_sub(1).filter(|&last| self.seen[last].image == image);
         let place = match last.or_else(|| self.index.get(image).copied()) {
             Some(place) => place,
@@ -182,7 +182,7 @@ impl Reader {
         let cov = match [covariance(11)?, covariance(12)?, covariance(13)?] {
             [Some(xx), Some(xy), Some(yy)] => Some([xx, xy, yy]),
             [None, None, None] => None,
-            _ => return Err(row.wrong(11, "a covariance has all of xx, xy and yy, or none")),
+            _ => return Err(row.wrong(11, "a covariance needs xx, xy and yy")),
         };
         let corner = GridCorner {
             row: place(6)?,
@@ -209,7 +209,7 @@ impl Reader {
         if (grid.kind, grid.target.as_deref(), grid.panel, grid.mirrored)
             != (kind, target, panel, mirrored)
         {
-            let problem = "another kind, target, panel or side than other corners of this grid";
+            let problem = "kind, target, panel or side differs from other corners of this grid";
             return Err(row.wrong(1, problem));
         }
         grid.corners.push(corner);
@@ -251,30 +251,30 @@ impl Reader {
             }
         };
         let (tags, corners) = (row.unsigned(5)?.unwrap_or(0), row.unsigned(4)?);
-        // Reasons take more than their text.
+        // Reasons take more memory than their text.
         budget.spend(image.len() as u64 + 8 * spent)?;
         let seen = self.seen(image, budget)?;
         let picture = Picture { image: image.to_owned(), tags, found };
         if seen.picture.replace(picture).is_some() {
-            let problem = "it stands twice in the table of pictures".to_owned();
+            let problem = "it is listed twice in the `pictures` table".to_owned();
             return Err(TableError::Picture { image: image.to_owned(), problem });
         }
         seen.corners = corners;
         Ok(())
     }
 
-    /// The pictures with their corners, each grid's by row and column.
+    /// Returns the images with their corners, sorted by row and column within each grid.
     ///
     /// # Errors
-    /// When corners are of a picture that is not in the table of pictures or could not be read, or the corners of a
-    /// picture contradict each other.
+    /// Returns an error if corners belong to an image that is not in the `pictures` table or could not be read, or if the corners of
+    /// an image contradict each other.
     pub fn finish(self) -> Result<Read, TableError> {
         let (mut pictures, mut short) = (Vec::with_capacity(self.seen.len()), 0);
         for Seen { image, picture, corners, grids } in self.seen {
             let wrong = |problem: String| TableError::Picture { image: image.clone(), problem };
             let Some(mut picture) = picture else {
                 return Err(wrong(
-                    "corners of it, but it is not in the table of pictures".to_owned(),
+                    "it has corners, but it is not in the `pictures` table".to_owned(),
                 ));
             };
             let count: usize = grids.values().map(|grid| grid.corners.len()).sum();
@@ -283,7 +283,7 @@ impl Reader {
             match &mut picture.found {
                 Ok(found) => {
                     found.grids = grids.into_values().collect();
-                    // Whatever moved the rows, their order is the one in which they were found.
+                    // Restores the order of detection, even if other programs moved the rows.
                     let order = |grid: &mut Grid| {
                         grid.corners.sort_by_key(|corner| (corner.row, corner.col))
                     };
@@ -292,7 +292,7 @@ impl Reader {
                     checked.map_err(|error| wrong(error.to_string()))?;
                 }
                 Err(_) if count > 0 => {
-                    return Err(wrong("corners of it, but it could not be read".to_owned()));
+                    return Err(wrong("it has corners, but it could not be read".to_owned()));
                 }
                 Err(_) => {}
             }
@@ -303,12 +303,12 @@ impl Reader {
 }
 
 fn damaged(error: ParquetError) -> TableError {
-    // Such as "Parquet error: …", of which the first words say nothing.
+    // Messages have the uninformative prefix "Parquet error: ".
     let words = error.to_string();
     TableError::File(words.trim_start_matches("Parquet error: ").to_owned())
 }
 
-/// Which table it is, by its columns.
+/// Identifies the table by its columns.
 fn contents(metadata: &ParquetMetaData) -> Result<Contents, TableError> {
     let schema = metadata.file_metadata().schema_descr();
     let has = |name: &str| schema.columns().iter().any(|column| column.path().string() == name);
@@ -328,7 +328,7 @@ fn contents(metadata: &ParquetMetaData) -> Result<Contents, TableError> {
     }
 }
 
-/// Where the columns are in a file.
+/// Positions of the columns in a file.
 fn places(
     metadata: &ParquetMetaData,
     columns: &'static [Column],
@@ -342,16 +342,16 @@ fn places(
             Some(place) => {
                 let found = schema.column(place);
                 let is_flat = found.max_rep_level() == 0 && found.max_def_level() <= 1;
-                is_flat.then_some(Some(place)).ok_or_else(|| wrong("a value in each row is needed"))
+                is_flat.then_some(Some(place)).ok_or_else(|| wrong("every row needs a value"))
             }
-            None if column.needed => Err(wrong("it is missing")),
+            None if column.needed => Err(wrong("the column is missing")),
             None => Ok(None),
         }
     };
     columns.iter().map(place).collect()
 }
 
-/// What may still be set aside, bytes.
+/// Memory that may still be allocated, bytes.
 struct Budget {
     left: u64,
     limits: Limits,
@@ -365,7 +365,7 @@ impl Budget {
     }
 }
 
-/// Looks at the sizes of all pages before any is unpacked.
+/// Checks the sizes of all pages before any is unpacked.
 fn check_groups(
     metadata: &ParquetMetaData,
     content: &Bytes,
@@ -387,11 +387,11 @@ fn check_groups(
                 let words = part.compression().to_string();
                 let name = words.split('(').next().unwrap_or_default().to_owned();
                 return Err(problem(format!(
-                    "compressed as {name}; write it with SNAPPY, or without"
+                    "compressed with {name}; write it with SNAPPY or uncompressed"
                 )));
             }
             let pages = pages_of(part, content)
-                .ok_or_else(|| problem("it lies outside of the file".to_owned()))?;
+                .ok_or_else(|| problem("it is outside the file".to_owned()))?;
             let entries = budget.limits.max_nodes;
             budget.spend(super::pages::unpacked_bytes(pages, entries).map_err(problem)?)?;
         }
@@ -431,7 +431,7 @@ impl Stream {
         let whole = |value: i32| {
             Cell::Whole(if unsigned { i64::from(value as u32) } else { i64::from(value) })
         };
-        // What NumPy has for a value that is missing.
+        // NumPy uses NaN for missing values.
         let real = |value: f64| if value.is_nan() { Cell::None } else { Cell::Real(value) };
         let cells = match &mut self.reader {
             ColumnReader::BoolColumnReader(from) => cells(from, count, has_gaps, Cell::Flag),
@@ -443,7 +443,7 @@ impl Stream {
             ColumnReader::DoubleColumnReader(from) => cells(from, count, has_gaps, real),
             ColumnReader::ByteArrayColumnReader(from) => cells(from, count, has_gaps, Cell::Text),
             _ => {
-                let problem = format!("no {}", name_of(self.column.kind));
+                let problem = format!("expected {}", name_of(self.column.kind));
                 return Err(TableError::Column { column: self.column.name, problem });
             }
         };
@@ -454,7 +454,7 @@ impl Stream {
     }
 }
 
-/// The next rows of a column; `None` as an error where it ends before.
+/// The next rows of a column; an error of `None` if the column ends too soon.
 fn cells<T: DataType>(
     from: &mut ColumnReaderImpl<T>,
     count: usize,
@@ -485,8 +485,8 @@ fn cells<T: DataType>(
 fn name_of(kind: Kind) -> &'static str {
     match kind {
         Kind::Text => "text",
-        Kind::Signed | Kind::Unsigned => "whole number",
-        Kind::Real => "number",
+        Kind::Signed | Kind::Unsigned => "an integer",
+        Kind::Real => "a number",
         Kind::Flag => "true or false",
     }
 }
@@ -510,25 +510,24 @@ impl<'a> Row<'a> {
     }
 
     fn missing(&self, at: usize) -> TableError {
-        self.wrong(at, format!("no {}", name_of(self.columns[at].kind)))
+        self.wrong(at, format!("expected {}", name_of(self.columns[at].kind)))
     }
 
     fn text(&self, at: usize) -> Result<Option<&'a str>, TableError> {
         match self.cell(at) {
             Cell::None => Ok(None),
             Cell::Text(bytes) if bytes.len() > MOST_TEXT => {
-                Err(self.wrong(at, format!("a text of more than {MOST_TEXT} bytes")))
+                Err(self.wrong(at, format!("text with more than {MOST_TEXT} bytes")))
             }
             Cell::Text(bytes) => {
                 let text = str::from_utf8(bytes.data());
-                text.map(Some).map_err(|_| self.wrong(at, "no text in UTF-8"))
+                text.map(Some).map_err(|_| self.wrong(at, "not UTF-8 text"))
             }
             _ => Err(self.missing(at)),
         }
     }
 
-    /// A whole number, which a table of floating-point numbers may have, too: where some are missing, others know no
-    /// other.
+    /// Returns an integer. It may be stored as floating-point, because some programs have no integers with missing values.
     fn whole(&self, at: usize) -> Result<Option<i64>, TableError> {
         match *self.cell(at) {
             Cell::None => Ok(None),
@@ -542,7 +541,7 @@ impl<'a> Row<'a> {
 
     fn unsigned(&self, at: usize) -> Result<Option<u32>, TableError> {
         let value = self.whole(at)?.map(u32::try_from).transpose();
-        value.map_err(|_| self.wrong(at, "not a whole number from 0 to 4294967295"))
+        value.map_err(|_| self.wrong(at, "not an integer from 0 to 4294967295"))
     }
 
     fn real(&self, at: usize, range: Range) -> Result<Option<f64>, TableError> {
@@ -572,8 +571,8 @@ impl<'a> Row<'a> {
         self.estimate(15, &fields)
     }
 
-    /// An estimate whose fields are in as many columns from `at` on, if the first has a value. It is read as from
-    /// JSON, which knows the ranges.
+    /// Returns an estimate from consecutive columns starting at `at`, if the first has a value. It is read like JSON, which checks
+    /// the ranges.
     fn estimate<T: DeserializeOwned>(
         &self,
         at: usize,

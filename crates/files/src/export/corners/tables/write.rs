@@ -1,4 +1,4 @@
-//! Writing of both tables, a group of rows at a time.
+//! Writer of both tables, a group of rows at a time.
 
 use std::collections::HashMap;
 use std::io::Write;
@@ -21,7 +21,7 @@ use deltille_core::detection::Detection;
 use deltille_core::lattice::GridKind;
 use deltille_core::targets::Target;
 
-/// Rows that are written together: a few megabytes, which is what is held in memory.
+/// Number of rows written together: a few megabytes in memory.
 const GROUP: usize = 1 << 16;
 
 impl From<ParquetError> for TableError {
@@ -30,7 +30,7 @@ impl From<ParquetError> for TableError {
     }
 }
 
-/// Writes both tables, picture by picture.
+/// Writes both tables, image by image.
 pub struct Writer<W: Write + Send> {
     corners: Table<W>,
     pictures: Table<W>,
@@ -39,14 +39,14 @@ pub struct Writer<W: Write + Send> {
     are_several: bool,
 }
 
-/// A corner of a target: of several its name, then panel, row and column.
+/// A corner of a target: the name of the target (with several targets), panel, row and column.
 type Label = (String, u32, i32, i32);
 
 impl<W: Write + Send> Writer<W> {
-    /// Begins both tables, of corners and of pictures. Corners on `targets` are written with their places.
+    /// Begins both tables, of corners and of images. Corners on `targets` are written with their positions on the target.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// Returns an error if the tables cannot be written.
     pub fn new(corners: W, pictures: W, targets: &[Target]) -> Result<Self, TableError> {
         let are_several = targets.len() > 1;
         let places = targets.iter().flat_map(|target| {
@@ -55,7 +55,7 @@ impl<W: Write + Send> Writer<W> {
                 let pose = panel.pose.to_pose();
                 let name = name.clone();
                 panel.corners.iter().map(move |corner| {
-                    // The plan's number is kept to the last digit where nothing was measured.
+                    // Without a measurement, the nominal position is written exactly.
                     let place = match corner.measured {
                         None => corner.target_mm,
                         Some(_) => {
@@ -74,10 +74,10 @@ impl<W: Write + Send> Writer<W> {
         })
     }
 
-    /// Adds a picture and its corners.
+    /// Adds an image and its corners.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// Returns an error if the tables cannot be written.
     pub fn push(&mut self, picture: &Picture) -> Result<(), TableError> {
         if let Ok(found) = &picture.found {
             self.push_corners(&picture.image, found)?;
@@ -122,16 +122,16 @@ impl<W: Write + Send> Writer<W> {
         Ok(())
     }
 
-    /// Ends both tables, and gives back what they were written to.
+    /// Ends both tables and returns their outputs.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// Returns an error if the tables cannot be written.
     pub fn finish(self) -> Result<[W; 2], TableError> {
         Ok([self.corners.finish()?, self.pictures.finish()?])
     }
 }
 
-/// How a tiling is called.
+/// The name of a tiling.
 pub(super) fn kind_name(kind: GridKind) -> &'static str {
     match kind {
         GridKind::Deltille => "deltille",
@@ -167,7 +167,7 @@ fn picture_row(picture: &Picture) -> [Cell; column::PICTURES.len()] {
     let sentences = |reasons: &Vec<deltille_core::detection::Reason>| {
         text(&reasons.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
     };
-    // Reasons are names and numbers.
+    // Reasons consist of names and numbers.
     let json =
         |value: serde_json::Value| text(value.as_str().map_or(&value.to_string(), |name| name));
     let to_json = |value: Result<_, _>| value.map_or(Cell::None, json);
@@ -203,14 +203,14 @@ fn picture_row(picture: &Picture) -> [Cell; column::PICTURES.len()] {
     ]
 }
 
-/// One table on its way to a file.
+/// A table that is being written.
 struct Table<W: Write + Send> {
     columns: Vec<Values>,
     rows: usize,
     out: SerializedFileWriter<W>,
 }
 
-/// Values of a column that are not yet written.
+/// Values of a column that are not written yet.
 struct Values {
     column: Column,
     /// Whether each row has a value: 1 or 0.
@@ -307,7 +307,7 @@ impl Values {
         match (&mut self.typed, cell) {
             (_, Cell::None) => {}
             (Typed::Text(values), Cell::Text(value)) => values.push(value),
-            // Those without a sign are stored in the same bits.
+            // Unsigned values are stored in the same bits.
             (Typed::Whole(values), Cell::Whole(value)) => values.push(value as i32),
             (Typed::Real(values), Cell::Real(value)) => values.push(value),
             (Typed::Flag(values), Cell::Flag(value)) => values.push(value),

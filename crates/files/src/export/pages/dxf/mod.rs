@@ -1,10 +1,10 @@
-//! DXF of AutoCAD release 12, as text, in millimetres: the dialect that every cutter reads.
+//! DXF of AutoCAD release 12, as text, in millimetres: the dialect that all cutters read.
 //!
-//! Closed paths are closed `POLYLINE`s, others are `LINE`s. The layers `CUT`, `FOLD`, `VALLEY` and
-//! `ENGRAVE` have a colour each, by which cutters choose the operation.
+//! Closed paths are closed `POLYLINE`s, others are `LINE`s. Each of the layers `CUT`, `FOLD`, `VALLEY` and `ENGRAVE` has a colour,
+//! by which cutters choose the operation.
 //!
-//! The reader accepts only what the writer writes, and names anything else: unknown elements could
-//! move, hide or scale what is cut.
+//! The reader accepts only files in the form of the writer, and names any other element: it could move, hide or scale the cut
+//! lines.
 
 mod read;
 mod write;

@@ -13,22 +13,22 @@ const CONTINUOUS: [(u32, &str); 6] =
 const HEAD: [(u32, &str); 5] =
     [(2, "HEADER"), (9, "$ACADVER"), (1, "AC1009"), (9, "$INSUNITS"), (70, "4")];
 
-/// Greatest difference of the stated extent from that of the paths, mm, by the number of digits.
+/// Maximum difference between the stated extent and that of the paths, mm, from the number of digits.
 const EXTENT_SLACK_MM: f64 = 2e-6;
 
-/// Why a `.dxf` file is refused.
+/// Error of reading a `.dxf` file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DxfError {
-    /// The file is not a DXF as text.
-    #[error("not a DXF of release 12 as text")]
+    /// The file is not a text DXF.
+    #[error("not a text DXF of release 12")]
     NotDxf,
     /// The file has an element that the writer does not write.
     #[error("line {line}: {construct}")]
     Construct {
         /// Counted from 1.
         line: usize,
-        /// The element, such as "entity CIRCLE".
+        /// The element, for example "entity CIRCLE".
         construct: String,
     },
 }
@@ -36,7 +36,7 @@ pub enum DxfError {
 /// Reads the text of a `.dxf` file, mm; each `LINE` becomes an open path of two points.
 ///
 /// # Errors
-/// When the file is not a DXF, or not one that [`text`](super::text) writes.
+/// Returns an error if the file is not a DXF, or not in the form of [`text`](super::text).
 pub fn read(text: &str) -> Result<CutDrawing, DxfError> {
     let records = records(text)?;
     let mut reader = Reader { records: &records, at: 0 };
@@ -49,25 +49,25 @@ pub fn read(text: &str) -> Result<CutDrawing, DxfError> {
     }
     let bounds = drawing.bounds_mm().unwrap_or_default();
     if extent.iter().zip(bounds).any(|(stated, found)| (stated - found).abs() > EXTENT_SLACK_MM) {
-        return Err(records[0].fault("an extent that is not that of the paths"));
+        return Err(records[0].fault("an extent that differs from the paths"));
     }
     written_otherwise(text, &drawing)?;
     Ok(drawing)
 }
 
-/// Refuses a text that differs from what the writer makes of its content; the first comment may
-/// name any version of the writer.
+/// Returns an error if the writer would write the content differently; the version of the writer in the first comment may
+/// differ.
 fn written_otherwise(found: &str, drawing: &CutDrawing) -> Result<(), DxfError> {
-    let anew = super::text(drawing);
+    let rewritten = super::text(drawing);
     let of_writer = |line: &str| line.starts_with("deltille ") && line.ends_with(", millimetres");
-    let mut pairs = found.split('\n').zip(anew.split('\n')).enumerate();
+    let mut pairs = found.split('\n').zip(rewritten.split('\n')).enumerate();
     let other = pairs.find(|(index, (a, b))| a != b && !(*index == 1 && of_writer(a)));
-    let same_length = found.split('\n').count() == anew.split('\n').count();
+    let same_length = found.split('\n').count() == rewritten.split('\n').count();
     match other {
         None if same_length => Ok(()),
         other => Err(DxfError::Construct {
             line: other.map_or(1, |(index, _)| index + 1),
-            construct: "a comment, a blank or a number that is written otherwise".to_owned(),
+            construct: "a comment, a blank or a number in another form".to_owned(),
         }),
     }
 }
@@ -145,8 +145,9 @@ impl Record<'_> {
                 }
                 let number: Option<f64> = text.parse().ok();
                 let number = number.filter(|number| number.is_finite());
-                *value = number
-                    .ok_or_else(|| self.fault(format!("`{text}` of {} is no number", self.name)))?;
+                *value = number.ok_or_else(|| {
+                    self.fault(format!("`{text}` of {} is not a number", self.name))
+                })?;
             }
             if values[2] != 0.0 {
                 return Err(self.fault(format!("{} out of the plane", self.name)));
@@ -302,12 +303,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read() {
+    fn written_drawings_are_read_back() {
         assert_eq!(read(&text(&drawing())), Ok(drawing()));
     }
 
     #[test]
-    fn what_is_not_written_is_named() {
+    fn unknown_elements_are_named() {
         let good = text(&drawing());
         for (from, to, named) in [
             ("  0\nLINE", "  0\nARC", "entity ARC"),

@@ -8,14 +8,14 @@ use super::{LAYERS, layer_name};
 use crate::export::GENERATOR;
 use deltille_layout::artwork::{CutDrawing, CutPath};
 
-/// The text of the `.dxf` file of a drawing, mm.
+/// Returns the text of the `.dxf` file of a drawing, mm.
 pub fn text(drawing: &CutDrawing) -> String {
     let [left, lower, right, upper] = drawing.bounds_mm().unwrap_or_default();
     let mut file = File::default();
     file.comment(&format!("{GENERATOR}, millimetres"));
     file.section("HEADER", |file| {
         file.tag(9, "$ACADVER").tag(1, "AC1009");
-        // Millimetres, for readers that know the variable of later releases.
+        // Millimetres, for readers that support this variable of later releases.
         file.tag(9, "$INSUNITS").tag(70, "4");
         file.tag(9, "$EXTMIN").point(10, DVec2::new(left, lower));
         file.tag(9, "$EXTMAX").point(10, DVec2::new(right, upper));
@@ -42,7 +42,7 @@ struct File {
 }
 
 impl File {
-    /// A group: its code and its value, a line each.
+    /// Writes a group: its code and its value, one line each.
     fn tag(&mut self, code: u32, value: &str) -> &mut Self {
         // Writing to a string does not fail.
         let _ = writeln!(self.text, "{code:>3}\n{value}");
@@ -53,7 +53,7 @@ impl File {
         self.tag(999, words);
     }
 
-    /// A point at z = 0; its coordinates have codes ten apart.
+    /// Writes a point at z = 0; the codes of its coordinates differ by ten.
     fn point(&mut self, code: u32, DVec2 { x, y }: DVec2) -> &mut Self {
         for (code, mm) in [(code, x), (code + 10, y), (code + 20, 0.0)] {
             self.tag(code, &format!("{:.6}", mm + 0.0));
