@@ -100,7 +100,7 @@ def test_calibrations_survive_writing_and_reading(calibration, board, tmp_path):
 def test_other_models(detections, board, model):
     found = deltille.calibrate(detections, board, model)
     assert found.model == model and found.rms_px < 0.1
-    with pytest.raises(deltille.CalibrationError, match="model"):
+    with pytest.raises(deltille.CalibrationError, match="unknown model"):
         deltille.calibrate(detections, board, "none")
 
 

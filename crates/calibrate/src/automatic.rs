@@ -1,9 +1,9 @@
-//! The model of a lens, chosen by views that took no part in finding it.
+//! Automatic selection of a lens model by its error on held-out views.
 //!
-//! Each model is found from two thirds of the views and held against the others, where poses alone are found. Of
-//! those that hold the views as well as the best one does, to 5 % in the error, the one with the fewest parameters is
-//! taken; one whose parameters the views do not tell apart only where there is no other. A spline, which has hundreds of
-//! parameters, is among them where there are corners enough for each of them.
+//! Each model is calibrated from two thirds of the views and evaluated on the others, where only poses are estimated. Of the
+//! models whose error is within 5 % of the best, the one with the fewest parameters is selected. A model with ill-conditioned
+//! parameters is selected only if there is no other. A spline, which has hundreds of parameters, is a candidate only if there are
+//! enough corners for each parameter.
 
 use std::collections::BTreeMap;
 
@@ -16,59 +16,58 @@ use super::model::{Model, TRIED};
 use super::problem::whitening::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
 use deltille_core::statistics::median;
 
-/// A spline is tried where corners have so many coordinates for each of its parameters: with fewer what is expected of
-/// its knots would hold it as much as they do, which tells nothing that a smaller model does not.
+/// Minimum number of corner coordinates per parameter of a spline. With fewer, the prior of its knots has as much weight as the
+/// corners, and the spline is no better than a smaller model.
 const COORDINATES_A_PARAMETER: usize = 10;
 
-/// Views that take part in the choice, evenly over the sequence.
+/// Maximum number of views used for the selection, evenly sampled.
 const MOST_VIEWS: usize = 60;
 
-/// Views that take part where nothing is to be chosen, only reported.
-const VIEWS_TO_TELL: usize = 24;
+/// Maximum number of views used for a comparison that is only reported.
+const VIEWS_TO_COMPARE: usize = 24;
 
-/// Every so many views are held out.
+/// Every n-th view is held out.
 const HELD_OUT: usize = 3;
 
-/// A model holds a lens if its mean square is at most by this part larger than the best one's, 5 % in the error.
+/// Maximum relative excess of the mean square error of an adequate model over the best one: 5 % in the error.
 const SAME: f64 = 0.1;
 
-/// A model that was tried.
+/// A model that was compared.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Candidate {
     /// The model.
     pub model: Model,
-    /// How many parameters it has.
+    /// Number of parameters.
     pub parameters: usize,
-    /// Root mean square error of a coordinate on views that took no part, px, in which corners that are off by more than
-    /// five deviations of the best model count as just five; `None` where no camera of the model was found.
+    /// RMS error per axis on held-out views, px. Errors are limited to five standard deviations of the best model. `None` if
+    /// the calibration did not converge.
     pub held_out_px: Option<f64>,
-    /// Whether the views tell all its parameters apart.
+    /// Whether all its parameters are well-conditioned.
     pub is_stable: bool,
-    /// Whether it holds the lens as well as the best one.
+    /// Whether it describes the lens as well as the best one.
     pub holds: bool,
-    /// Whether it was chosen.
+    /// Whether it was selected.
     pub chosen: bool,
-    /// The camera that was found from the views that were not held out.
+    /// The camera that was calibrated from the training views.
     pub found: Option<CameraEstimate>,
 }
 
-/// The errors of a model on views that took no part.
+/// The errors of a model on held-out views.
 struct Tried {
     /// By view, px².
     squares: BTreeMap<String, Vec<f64>>,
     is_stable: bool,
     camera: CameraEstimate,
-    /// How many parameters were found.
+    /// Number of estimated parameters.
     parameters: usize,
 }
 
 impl Calibration {
-    /// The model to be found of a camera, and what speaks for it. Where its model is given already, it counts for
-    /// nothing here.
+    /// Selects the model of a camera, and returns the compared candidates. A model that was given for the camera is ignored.
     ///
     /// # Errors
-    /// Where there are too few views to hold some out, or no model explains them.
+    /// Returns an error if there are too few views to hold some out, or if no model explains them.
     pub fn choose_model(&self, camera: usize) -> Result<(Model, Vec<Candidate>), CalibrationError> {
         let views = evenly(&self.cameras[camera].views, MOST_VIEWS);
         let coordinates: usize = views.map(|view: &View| 2 * view.corner_count()).sum();
@@ -84,14 +83,14 @@ impl Calibration {
         Ok((model, candidates))
     }
 
-    /// What the models beside that of a camera leave on views that took no part, for comparison: of few views, so that
-    /// it takes no longer than the calibration. None of a camera that is known.
+    /// Compares the model of a camera with similar models on held-out views. Uses few views, so it takes no longer than the
+    /// calibration. Returns no candidates for a fixed camera.
     ///
     /// # Errors
-    /// Where there are too few views to hold some out, or no model explains them.
+    /// Returns an error if there are too few views to hold some out, or if no model explains them.
     pub fn compare_models(&self, camera: usize) -> Result<Vec<Candidate>, CalibrationError> {
         match self.cameras[camera].intrinsics.model() {
-            Some(model) => self.tried(camera, &model.neighbours(), VIEWS_TO_TELL),
+            Some(model) => self.tried(camera, &model.neighbours(), VIEWS_TO_COMPARE),
             None => Ok(Vec::new()),
         }
     }
@@ -131,7 +130,7 @@ impl Calibration {
 }
 
 impl Tried {
-    /// `None` where no views were held out.
+    /// Returns `None` if no views were held out.
     fn of(found: &Estimate) -> Option<Self> {
         let views = found.held_out.as_deref()?.cameras.iter().flat_map(|camera| &camera.views);
         let of_view = |view: &ViewEstimate| {
@@ -146,7 +145,7 @@ impl Tried {
     }
 }
 
-/// Compares models by the same corners: those of all views that any model explains.
+/// Compares models on the same corners: those of all views that any model explains.
 fn judged(tried: &[(Model, Option<Tried>)]) -> Vec<Candidate> {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     let found = || tried.iter().filter_map(|(_, found)| found.as_ref());
@@ -161,7 +160,7 @@ fn judged(tried: &[(Model, Option<Tried>)]) -> Vec<Candidate> {
         return tried.iter().map(|(model, _)| candidate(*model, None, false)).collect();
     };
     let most = OUTLIER_SIGMA * OUTLIER_SIGMA * least / MEDIAN_OF_CHI_SQUARED_2;
-    // Means by view; a corner or a view that a model does not reach counts as an outlier.
+    // Means by view; a corner or a view that a model cannot project counts as an outlier.
     let means = |found: &Tried| -> Vec<f64> {
         let of_view = |(name, &count): (&&str, &usize)| {
             let squares = found.squares.get(*name).map_or(&[][..], Vec::as_slice);

@@ -1,4 +1,4 @@
-//! Models of lenses: names, where their search starts, which parameters are free, smaller and richer ones.
+//! Lens models: names, starting points, free parameters, and smaller and richer models.
 
 use std::f64::consts::FRAC_PI_2;
 use std::mem::discriminant;
@@ -11,19 +11,19 @@ use deltille_core::camera::{
     DoubleSphere, Lens, LensKind, MAX_LENS_PARAMETERS, PROJECTION_PARAMETERS, SplineGrid,
 };
 
-/// Terms of a Kannala–Brandt polynomial unless said otherwise.
+/// Default number of terms of a Kannala–Brandt polynomial.
 const TERMS: usize = 4;
 
-/// Terms that hold the fisheyes which [`TERMS`] do not; from there on it is not for want of terms.
+/// Number of terms for fisheye lenses that [`TERMS`] do not describe; further terms do not help.
 const MORE_TERMS: usize = 6;
 
-/// Knots of a spline whose lens is not known yet; a perspective one of 4 : 3 has about as many.
+/// Knots of a spline before the lens is known; a perspective lens with a 4 : 3 image needs about this number.
 const SPLINE_KNOTS: [usize; 2] = [16, 12];
 
-/// The degree of a spline unless said otherwise.
+/// Default degree of a spline.
 const SPLINE_DEGREE: usize = 3;
 
-/// ξ in the two valleys of double sphere.
+/// Starting values of ξ in the two valleys of the double sphere model.
 const VALLEYS: [f64; 2] = [-0.3, 0.3];
 
 /// A camera model: which parameters are estimated beside fx, fy, cx and cy.
@@ -32,13 +32,13 @@ const VALLEYS: [f64; 2] = [-0.3, 0.3];
 pub enum Model {
     /// Perspective with k1, k2, p1, p2.
     Radtan,
-    /// As [`Self::Radtan`], and k3.
+    /// [`Self::Radtan`] with k3.
     Radtan5,
-    /// As [`Self::Radtan5`], and k4, k5, k6.
+    /// [`Self::Radtan5`] with k4, k5, k6.
     Rational,
-    /// As [`Self::Rational`], and s1, s2, s3, s4.
+    /// [`Self::Rational`] with s1, s2, s3, s4.
     ThinPrism,
-    /// Equidistant fisheye polynomial with so many coefficients k1, k2, ….
+    /// Equidistant fisheye polynomial with the given number of coefficients k1, k2, ….
     KannalaBrandt(usize),
     /// Extended unified camera model with α and β.
     Eucm,
@@ -46,48 +46,48 @@ pub enum Model {
     DoubleSphere,
     /// Equidistant polynomial with a moving entrance pupil.
     Pupil,
-    /// Stereographic with a correction by a spline, see [`Spline`]. fx, fy, cx, cy are not found: they are those of the
+    /// Stereographic projection with a spline correction, see [`Spline`]. fx, fy, cx, cy are fixed at those of the
     /// parametric lens from which the search starts.
     Spline {
         /// Degree of the polynomials, 2 or 3.
         degree: usize,
-        /// Knots along x and y; where none are said as many as it takes for them to be a twelfth of the image's longer
-        /// side apart in its middle.
+        /// Number of knots along x and y. `None` spaces the knots by a twelfth of the longer image side in the image
+        /// centre.
         knots: Option<[usize; 2]>,
     },
 }
 
-/// A text that is no model.
+/// An unknown name of a model.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct ModelError(String);
 
-/// What is known of a model.
+/// Properties of a model.
 struct Facts {
-    /// What it is asked for by.
+    /// The name that selects it.
     name: &'static str,
-    /// The model, of those with a number the one that the name alone stands for.
+    /// The model; for models with a number, the one with the default number.
     model: Model,
     /// Its lens.
     lens: LensKind,
-    /// How many parameters of the lens it has at most, from the first; the others are zero.
+    /// Maximum number of lens parameters that are estimated, from the first; the others are zero.
     found: usize,
-    /// What help texts say of it.
+    /// Its description in help texts.
     help: &'static str,
-    /// What errors say of its name.
+    /// The forms of its name in error messages.
     forms: &'static str,
     /// See [`Model::richer`].
     richer: &'static [Model],
 }
 
 impl Facts {
-    /// Whether they are of this model, with whatever number.
+    /// Whether these are the properties of this model, with any number.
     fn is_of(&self, model: Model) -> bool {
         discriminant(&self.model) == discriminant(&model)
     }
 }
 
-/// A model of which nothing more is to be said.
+/// Default properties of a model.
 const PLAIN: Facts = Facts {
     name: "",
     model: Model::Radtan,
@@ -98,7 +98,7 @@ const PLAIN: Facts = Facts {
     richer: &[],
 };
 
-/// The models, in the order in which they are listed; those of one lens with fewer parameters first.
+/// The models in the order of lists; models of the same lens are sorted by number of parameters.
 const MODELS: [Facts; 9] = [
     Facts {
         name: "radtan",
@@ -140,7 +140,7 @@ const MODELS: [Facts; 9] = [
         model: Model::KannalaBrandt(TERMS),
         lens: LensKind::KannalaBrandt,
         help: "4 terms; kannala-brandt-5 …",
-        forms: "with 4 terms; kannala-brandt-5 and so on up to 12",
+        forms: "4 terms; kannala-brandt-5 to kannala-brandt-12",
         richer: &[Model::KannalaBrandt(MORE_TERMS), Model::Pupil],
         ..PLAIN
     },
@@ -169,14 +169,14 @@ const MODELS: [Facts; 9] = [
         name: "spline",
         model: Model::SPLINE,
         lens: LensKind::Spline,
-        help: "any smooth lens, of degree 3; spline-2; spline-3-16x12 with so many knots",
-        forms: "of degree 3; spline-2; with as many knots as you say: spline-3-16x12",
+        help: "any smooth lens, degree 3; spline-2 for degree 2; spline-3-16x12 for 16 × 12 knots",
+        forms: "degree 3; spline-2 for degree 2; spline-3-16x12 for 16 × 12 knots",
         ..PLAIN
     },
 ];
 
-/// Those that are tried where the model is to be chosen; of two that hold the views alike and have as many parameters,
-/// the first is taken.
+/// The candidates of automatic model selection. Of two equally good models with the same number of parameters, the first is
+/// selected.
 pub(super) const TRIED: [Model; 10] = [
     Model::Radtan,
     Model::Eucm,
@@ -190,7 +190,7 @@ pub(super) const TRIED: [Model; 10] = [
     Model::SPLINE,
 ];
 
-/// The models with what is said of each, as a list in a sentence.
+/// The models with a description each, as a list in a sentence.
 fn listed(said: impl Fn(&Facts) -> &'static str) -> String {
     let model = |facts: &Facts| match said(facts) {
         "" => facts.name.to_owned(),
@@ -201,15 +201,15 @@ fn listed(said: impl Fn(&Facts) -> &'static str) -> String {
 }
 
 impl Model {
-    /// A cubic spline with as many knots as it takes.
+    /// A cubic spline with an automatic number of knots.
     pub const SPLINE: Self = Self::Spline { degree: SPLINE_DEGREE, knots: None };
 
-    /// The models by name; of those with a number the one that the name alone stands for.
+    /// Returns the models by name; models with a number have the default number.
     pub fn named() -> impl Iterator<Item = (&'static str, Self)> {
         MODELS.iter().map(|facts| (facts.name, facts.model))
     }
 
-    /// What may be asked for, in words, with what each is.
+    /// Returns the list of all models with their descriptions, for a sentence.
     pub fn choice() -> String {
         listed(|facts| facts.help)
     }
@@ -218,17 +218,17 @@ impl Model {
         MODELS.iter().find(|facts| facts.is_of(self)).expect("every model is in the table")
     }
 
-    /// What kind of lens it has.
+    /// Returns the kind of its lens.
     pub fn kind(self) -> LensKind {
         self.facts().lens
     }
 
-    /// How many parameters of its lens it has, from the first; the others are zero.
+    /// Returns the number of estimated lens parameters, from the first; the others are zero.
     pub fn found(self) -> usize {
         self.lens().names().len().min(self.facts().found)
     }
 
-    /// A lens of this model to start from: near the axis its radius is that of the angle.
+    /// Returns an initial lens of this model: near the axis, its radius equals the angle.
     pub fn lens(self) -> Lens {
         let (terms, grid) = match self {
             Self::KannalaBrandt(terms) => (terms, None),
@@ -240,11 +240,11 @@ impl Model {
         self.kind().lens(terms, grid).expect("a spline has a grid, and no other lens")
     }
 
-    /// The lenses to start from, each with its focal length over that of an ideal camera.
+    /// Returns the initial lenses, each with the ratio of its focal length to that of an ideal camera.
     ///
-    /// The cost of double sphere has two valleys, one on either side of ξ = 0, and no way between
-    /// them. Near the axis its radius is fx/(1 + ξ) times the angle; with the α here it is so at 90°
-    /// too:
+    /// The cost of the double sphere model has two valleys, one on either side of ξ = 0, separated by a
+    /// barrier. Near the axis, its radius is fx/(1 + ξ) times the angle; this α gives the same ratio at
+    /// 90°:
     ///
     /// ```text
     ///     (1 + ξ) / (α √(1 + ξ²) + (1 − α) ξ) = π/2
@@ -261,7 +261,7 @@ impl Model {
         }
     }
 
-    /// Which of the camera's parameters it has.
+    /// Returns, for each camera parameter, whether the model estimates it.
     pub fn free(self) -> Vec<bool> {
         let count = PROJECTION_PARAMETERS.len();
         let (lens, found) = (self.lens(), self.found());
@@ -269,7 +269,7 @@ impl Model {
         without_gauge(&lens, iter::repeat_n(true, count).chain(free).collect())
     }
 
-    /// The next one that has fewer of the same parameters, where there is one.
+    /// Returns the next smaller model with a subset of the same parameters, if there is one.
     pub fn smaller(self) -> Option<Self> {
         match self {
             Self::KannalaBrandt(terms) if terms > TERMS => Some(Self::KannalaBrandt(terms - 1)),
@@ -280,7 +280,7 @@ impl Model {
         }
     }
 
-    /// Those that may hold a lens where this one does not, the simplest first.
+    /// Returns models that may describe a lens that this model does not, the simplest first.
     pub fn richer(self) -> &'static [Self] {
         match self {
             Self::KannalaBrandt(terms) if terms >= MORE_TERMS => &[Self::Pupil],
@@ -288,8 +288,8 @@ impl Model {
         }
     }
 
-    /// Models to be compared with it, and it: of those that are tried the ones for lenses of its kind, and the polynomial
-    /// for any; no spline.
+    /// Returns the models to compare with this one, including it: the candidates for the same kind of lens and the fisheye
+    /// polynomial, without splines.
     pub(super) fn neighbours(self) -> Vec<Self> {
         let is_alike = |other: &Self| {
             let is_of_any = *other == Self::KannalaBrandt(TERMS);
@@ -300,14 +300,14 @@ impl Model {
         of_kind.into_iter().chain(own).collect()
     }
 
-    /// The parameters that are found first, while poses are rough: focal lengths and the two
-    /// coarsest of the lens.
+    /// Returns the parameters that are estimated first, while poses are rough: focal lengths and the two
+    /// most important of the lens.
     pub(super) fn coarse(self) -> Vec<bool> {
         let coarse = |i: usize| matches!(i, 0 | 1 | 4 | 5);
         (0..self.free().len()).map(coarse).collect()
     }
 
-    /// Whether it sees no more than a half-space.
+    /// Whether its field of view is limited to a half-space.
     pub(super) fn is_perspective(self) -> bool {
         self.kind() == LensKind::BrownConrady
     }
@@ -321,17 +321,18 @@ impl FromStr for Model {
             return Ok(model);
         }
         if let Some((degree, knots)) = text.strip_prefix("spline-").and_then(spline) {
-            // Any field of view: it is found later.
+            // The field of view is estimated later.
             SplineGrid::new(degree, knots.unwrap_or(SPLINE_KNOTS), 90)
-                .map_err(|error| ModelError(format!("`{text}` is no model: {error}")))?;
+                .map_err(|error| ModelError(format!("invalid model `{text}`: {error}")))?;
             return Ok(Self::Spline { degree, knots });
         }
         let terms = text.strip_prefix("kannala-brandt-").and_then(|terms| terms.parse().ok());
         match terms.filter(|terms| (TERMS..=MAX_LENS_PARAMETERS).contains(terms)) {
             Some(terms) => Ok(Self::KannalaBrandt(terms)),
-            None => {
-                Err(ModelError(format!("`{text}` is no model: {}", listed(|facts| facts.forms))))
-            }
+            None => Err(ModelError(format!(
+                "unknown model `{text}`; known: {}",
+                listed(|facts| facts.forms)
+            ))),
         }
     }
 }
@@ -350,7 +351,7 @@ impl fmt::Display for Model {
     }
 }
 
-/// Degree and knots of what follows `spline-`.
+/// Parses the degree and the knots after `spline-`.
 fn spline(text: &str) -> Option<(usize, Option<[usize; 2]>)> {
     let (degree, knots) = match text.split_once('-') {
         Some((degree, knots)) => (degree, Some(knots.split_once('x')?)),
@@ -364,17 +365,17 @@ fn spline(text: &str) -> Option<(usize, Option<[usize; 2]>)> {
     Some((degree, knots))
 }
 
-/// Which parameters of a camera are found of those that are to be, without those that others make up for.
+/// Removes gauge parameters from the free parameters of a camera.
 ///
-/// Of a spline that is fx, fy, cx, cy; and as any turn of the camera is a spline too, three numbers hold it: the knot in
-/// the middle stays where it is, and the one to its right in its row.
+/// For a spline, these are fx, fy, cx, cy. Any rotation of the camera is also a spline, so three numbers are fixed in addition:
+/// both coordinates of the knot in the middle, and one of the knot to its right.
 pub(super) fn without_gauge(lens: &Lens, mut free: Vec<bool>) -> Vec<bool> {
     let Lens::Spline(spline) = lens else { return free };
     if !free.contains(&true) {
         return free;
     }
     let (grid, of_lens) = (spline.grid(), PROJECTION_PARAMETERS.len());
-    // A model does not know how many knots it takes.
+    // A model does not know the number of knots.
     free = match free.len() == of_lens + 2 * grid.count() {
         true => free,
         false => vec![true; of_lens + 2 * grid.count()],
@@ -382,8 +383,8 @@ pub(super) fn without_gauge(lens: &Lens, mut free: Vec<bool>) -> Vec<bool> {
     free[..of_lens].fill(false);
     let middle = of_lens + 2 * (grid.rows / 2 * grid.columns + grid.columns / 2);
     // dx and dy of the middle, and dy of the next.
-    for held in [middle, middle + 1, middle + 3] {
-        free[held] = false;
+    for fixed in [middle, middle + 1, middle + 3] {
+        free[fixed] = false;
     }
     free
 }
