@@ -1,4 +1,4 @@
-//! Calibration of simulated cameras, whose truth is known, and of views that make none.
+//! Calibration of simulated cameras with known parameters, and of views that determine no camera.
 
 use deltille::calibrate::{
     Calibration, CalibrationError, Diagnosis, Estimate, Instead, Intrinsics, LackOfFit, Loss,
@@ -13,7 +13,7 @@ use rand_distr::{Distribution, Normal};
 /// Standard deviation of the simulated corners, px.
 const NOISE_PX: f64 = 0.05;
 
-/// A camera of a model with coefficients as lenses have them.
+/// A camera of a model with realistic coefficients.
 pub(super) fn camera(model: Model) -> Camera {
     let values: &[f64] = match model {
         Model::Radtan => &[-0.17, 0.02, 5e-4, 2e-4],
@@ -38,7 +38,7 @@ pub(super) fn camera(model: Model) -> Camera {
     camera
 }
 
-/// A view of a plane board of 8 × 11 corners; `None` where not all of it is seen.
+/// A view of a planar board of 8 × 11 corners; `None` if a part of it is not visible.
 fn view(camera: &Camera, pose: &Pose, name: &str, noise: &mut impl FnMut() -> f64) -> Option<View> {
     let mut observations = Vec::new();
     for row in 0..8 {
@@ -55,7 +55,7 @@ fn view(camera: &Camera, pose: &Pose, name: &str, noise: &mut impl FnMut() -> f6
     Some(View { name: name.to_owned(), image: format!("{name}.png"), size_px, sightings })
 }
 
-/// A pose of a board that faces the camera in any direction that it sees, tilted by up to `tilt`.
+/// A pose of a board that faces the camera in any visible direction, tilted by up to `tilt_rad`.
 fn any_pose(rng: &mut ChaCha8Rng, reach_rad: f64, tilt_rad: f64, distance: f64) -> Pose {
     let around = |rng: &mut ChaCha8Rng, angle: f64| {
         let phi = rng.random_range(0.0..std::f64::consts::TAU);
@@ -66,13 +66,13 @@ fn any_pose(rng: &mut ChaCha8Rng, reach_rad: f64, tilt_rad: f64, distance: f64) 
     let turned = rng.random_range(0.0..tilt_rad);
     let tilt = around(rng, turned);
     let roll = DQuat::from_rotation_z(rng.random_range(-3.0..3.0));
-    // y up on the print is y down in the camera: half a turn about x faces the board.
+    // y points up on the print and down in the camera: a rotation by 180° about x faces the board.
     let rotation = towards * tilt * roll * DQuat::from_rotation_x(std::f64::consts::PI);
     let centre = towards * DVec3::Z * rng.random_range(1.0..2.2) * distance;
     Pose { rotation, translation: centre - rotation * DVec3::new(100.0, 70.0, 0.0) }
 }
 
-/// So many views of a camera with noise.
+/// A number of views of a camera with noise.
 pub(super) fn simulated(
     camera: &Camera,
     count: usize,
@@ -96,13 +96,13 @@ pub(super) fn simulated(
     (views, truth)
 }
 
-/// A camera whose lens is bent by another amount for every seed, from half as much to half as much again.
+/// A camera whose distortion differs for every seed, from 0.5 to 1.5 times the usual one.
 fn any_camera(model: Model, seed: u64) -> Camera {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let camera = camera(model);
     let mut values = camera.parameters();
     let from = match model {
-        // What these are near 0 and 1 is another lens.
+        // Values of these near 0 and 1 make another lens.
         Model::Eucm | Model::DoubleSphere => values.len(),
         _ => 4,
     };
@@ -114,27 +114,27 @@ fn any_camera(model: Model, seed: u64) -> Camera {
     camera.with_parameters(&values)
 }
 
-/// Of how many lenses the model is chosen that holds them, and of how many.
+/// The number of lenses for which an adequate model is selected, and the number of lenses.
 fn chosen(models: &[Model], seeds: std::ops::Range<u64>) -> (usize, usize) {
     let (mut good, mut all) = (0, 0);
     for &model in models {
         for seed in seeds.clone() {
             let truth = any_camera(model, seed);
             let (views, _) = simulated(&truth, 30, 0.7, seed);
-            let (taken, tried) = of(&views, model).choose_model(0).unwrap();
+            let (selected, tried) = of(&views, model).choose_model(0).unwrap();
             let px = |model: Model| {
                 let of_model = tried.iter().find(|candidate| candidate.model == model);
                 of_model.and_then(|candidate| candidate.held_out_px).unwrap_or(f64::INFINITY)
             };
-            let holds = px(taken) <= 1.05 * px(model);
-            if !holds {
+            let is_adequate = px(selected) <= 1.05 * px(model);
+            if !is_adequate {
                 println!(
-                    "{model}, seed {seed}: {taken} with {:.4} px, not {:.4}",
-                    px(taken),
+                    "{model}, seed {seed}: {selected} with {:.4} px, not {:.4}",
+                    px(selected),
                     px(model)
                 );
             }
-            (good, all) = (good + usize::from(holds), all + 1);
+            (good, all) = (good + usize::from(is_adequate), all + 1);
         }
     }
     (good, all)
@@ -154,7 +154,7 @@ fn the_model_chosen_holds_nearly_every_lens() {
     assert!(good as f64 >= 0.95 * all as f64, "{good} of {all}");
 }
 
-/// All but splines.
+/// All models except splines.
 fn models() -> impl Iterator<Item = Model> {
     Model::named().map(|(_, model)| model).filter(|model| *model != Model::SPLINE)
 }
@@ -167,8 +167,7 @@ pub(super) fn solved(views: &[View], model: Model) -> Estimate {
     of(views, model).solve().unwrap()
 }
 
-/// How many parameters of cameras and poses lie within three standard deviations of the truth, and
-/// of how many.
+/// The number of parameters of cameras and poses within three standard deviations of the truth, and the number of parameters.
 fn within_3_sigma(model: Model, seed: u64) -> (usize, usize) {
     let truth = camera(model);
     let (views, poses) = simulated(&truth, 25, 0.8, seed);
@@ -187,10 +186,9 @@ fn within_3_sigma(model: Model, seed: u64) -> (usize, usize) {
     (errors.iter().filter(|error| error.abs() <= 3.0).count(), errors.len())
 }
 
-/// One direction that is off by three deviations takes the poses of all views with it; over several
-/// seeds that evens out.
+/// A direction with an error of 3σ shifts the poses of all views; several seeds average this out.
 #[test]
-fn every_model_is_found_without_a_guess_and_knows_its_precision() {
+fn every_model_converges_without_a_guess_and_states_its_precision() {
     let counts = models().map(|model| {
         let counts = (0..4).map(|seed| within_3_sigma(model, seed));
         counts.fold((0, 0), |sum, c| (sum.0 + c.0, sum.1 + c.1))
@@ -212,11 +210,11 @@ fn truth_lies_within_3_sigma() {
 }
 
 #[test]
-fn wrong_views_and_wrong_corners_are_named_and_do_no_harm() {
+fn inconsistent_views_and_outliers_are_named_and_harmless() {
     let truth = camera(Model::Radtan);
     let (mut views, _) = simulated(&truth, 30, 0.8, 7);
     for wrong in [3, 11, 20, 21] {
-        // The labels of another picture.
+        // The labels of another image.
         let other = views[(wrong + 5) % 30].sightings[0].observations.clone();
         let rotated = views[wrong].sightings[0].observations.iter_mut().rev().zip(other);
         for (seen, other) in rotated {
@@ -243,7 +241,7 @@ fn wrong_views_and_wrong_corners_are_named_and_do_no_harm() {
 }
 
 #[test]
-fn poses_alone_are_those_of_the_truth() {
+fn poses_with_fixed_intrinsics_match_the_truth() {
     for model in [Model::Radtan, Model::Pupil] {
         let truth = camera(model);
         let (views, expected) = simulated(&truth, 5, 0.8, 3);
@@ -280,9 +278,9 @@ fn views_that_determine_no_camera_are_refused() {
     assert!(matches!(said, CalibrationError::Parallel { .. }), "{said}");
 }
 
-/// Without distortion numerator and denominator of the rational model are the same, whatever they are.
+/// Without distortion, numerator and denominator of the rational model are equal, and their value is not determined.
 #[test]
-fn parameters_that_cannot_be_told_apart_are_named_and_do_no_harm() {
+fn ill_conditioned_parameters_are_named_and_harmless() {
     let mut values = [0.0; 16];
     values[..4].copy_from_slice(&[625.0, 625.0, 804.0, 606.0]);
     let truth = camera(Model::Radtan).with_parameters(&values);
@@ -298,7 +296,7 @@ fn parameters_that_cannot_be_told_apart_are_named_and_do_no_harm() {
 }
 
 #[test]
-fn any_focal_length_is_found() {
+fn any_focal_length_is_estimated() {
     for (seed, focal) in [300.0, 1000.0, 4000.0, 20_000.0].into_iter().enumerate() {
         let mut values = [0.0; 16];
         values[..4].copy_from_slice(&[focal, focal * 1.01, 790.0, 610.0]);
@@ -317,7 +315,7 @@ fn any_focal_length_is_found() {
 }
 
 #[test]
-fn a_lens_of_its_model_leaves_no_pattern() {
+fn the_correct_model_leaves_no_pattern() {
     for seed in 0..20 {
         let (views, _) = simulated(&camera(Model::Radtan), 20, 0.8, 300 + seed);
         let found = solved(&views, Model::Radtan);
@@ -325,7 +323,7 @@ fn a_lens_of_its_model_leaves_no_pattern() {
     }
 }
 
-/// A lens of a model with one value changed.
+/// A lens of a model with one changed value.
 fn with(model: Model, index: usize, value: f64) -> Camera {
     let camera = camera(model);
     let mut values = camera.parameters();
@@ -334,7 +332,7 @@ fn with(model: Model, index: usize, value: f64) -> Camera {
 }
 
 #[test]
-fn a_lens_of_another_model_leaves_a_pattern_over_the_image() {
+fn a_wrong_model_leaves_a_pattern_over_the_image() {
     let (views, _) = simulated(&with(Model::Radtan5, 8, -0.02), 25, 0.8, 3);
     let found = solved(&views, Model::Radtan);
     assert!(
@@ -344,9 +342,9 @@ fn a_lens_of_another_model_leaves_a_pattern_over_the_image() {
     );
 }
 
-/// A lens that needs no denominator leaves numerator and denominator to chance; one that does needs both.
+/// If a lens needs no denominator, noise determines numerator and denominator; otherwise both are needed.
 #[test]
-fn the_smallest_model_that_holds_a_lens_is_named() {
+fn the_simplest_adequate_model_is_named() {
     let smallest = |truth: &Camera, model: Model| {
         let (views, _) = simulated(truth, 20, 0.8, 5);
         let found = solved(&views, model);
@@ -363,9 +361,9 @@ fn the_smallest_model_that_holds_a_lens_is_named() {
     assert_eq!(smallest(&camera(Model::Radtan5), Model::Radtan5).1, None);
 }
 
-/// A lens of another model is told, and what holds it; one of its own model needs nothing.
+/// A wrong lens model is reported with an adequate one; the correct model needs no remedy.
 #[test]
-fn what_makes_a_calibration_fit_is_found() {
+fn the_remedy_of_a_wrong_model_is_found() {
     let said = |truth: &Camera, model: Model| {
         let (views, _) = simulated(truth, 20, 0.8, 5);
         of(&views, model).explain(&solved(&views, model))

@@ -1,5 +1,4 @@
-//! Help texts and the guide: the programs understand the command lines that are shown there, and every option is told in
-//! both.
+//! Help texts and the guide: the programs accept the command lines that are shown there, and both describe every option.
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +9,7 @@ use deltille_cli::{deltag::Deltag, deltille::Deltille};
 
 use crate::common::page::Page;
 
-/// A program with all its commands, or a command with its own, each by its whole name.
+/// A program with all its commands, or a command with its subcommands, each with its full name.
 fn commands(name: &str, command: Command) -> Vec<(String, Command)> {
     let own = command.get_subcommands().cloned().collect::<Vec<_>>();
     let own = own.into_iter().flat_map(|own| commands(&format!("{name} {}", own.get_name()), own));
@@ -26,7 +25,7 @@ fn shown(command: &Command) -> impl Iterator<Item = &Arg> {
     command.get_arguments().filter(|argument| !argument.is_hide_set())
 }
 
-/// Pages of the guide, each with its name.
+/// Pages of the guide with their names.
 fn guide() -> Vec<(String, String)> {
     let root = Path::new(crate::common::REPOSITORY);
     let pages = fs::read_dir(root.join("docs")).unwrap().map(|entry| entry.unwrap().path());
@@ -35,10 +34,10 @@ fn guide() -> Vec<(String, String)> {
     pages.map(|path| (path.display().to_string(), fs::read_to_string(path).unwrap())).collect()
 }
 
-/// The command lines of our programs in a line for a shell.
+/// The command lines of our programs in a shell line.
 fn command_lines(line: &str) -> Vec<Vec<String>> {
     let line = line.split(" #").next().unwrap();
-    // What the loop of a guide puts there.
+    // The value that the loop of a guide inserts.
     let line = line.replace("$eye", "0,0,400").replace("$i", "1");
     let words: Vec<&str> = line.split_whitespace().collect();
     let ends_command = |word: &&str| ["|", "&&", ";", "do", ">", "2>"].contains(word);
@@ -48,7 +47,7 @@ fn command_lines(line: &str) -> Vec<Vec<String>> {
     parts.map(|part| part.iter().map(word).collect()).collect()
 }
 
-/// Command lines of a page: those of its code, and those within its text, which may leave words out.
+/// Command lines of a page: those in its code, and those in its text, which may be abridged.
 fn command_lines_of_page(page: &str) -> (Vec<Vec<String>>, Vec<Vec<String>>) {
     let (mut of_code, mut of_text) = (Vec::new(), Vec::new());
     let page = page.replace("\\\n", " ");
@@ -64,7 +63,7 @@ fn command_lines_of_page(page: &str) -> (Vec<Vec<String>>, Vec<Vec<String>>) {
             let spans = paragraph.split('`').skip(1).step_by(2);
             let lines =
                 spans.flat_map(|span| command_lines(&span.replace("=…", "=any").replace('…', " ")));
-            // A program alone is its name, and `<command>` is none.
+            // A program without arguments is only a name, and `<command>` is a placeholder.
             of_text.extend(lines.filter(|words| words.len() > 1 && !words[1].starts_with('<')));
         }
     }
@@ -76,7 +75,7 @@ fn parsed(words: &[String]) -> Result<(), Error> {
     program.try_get_matches_from(words).map(drop)
 }
 
-/// Whether a line is refused only for what it leaves out, or asks for a help text.
+/// Whether a line is refused only because it is abridged, or asks for a help text.
 fn is_abridged(error: &Error) -> bool {
     let has_no_value = matches!(
         error.get(ContextKind::InvalidValue),
@@ -94,7 +93,7 @@ fn is_abridged(error: &Error) -> bool {
 }
 
 #[test]
-fn command_lines_in_help_texts_and_in_the_guide_are_understood() {
+fn command_lines_in_help_texts_and_the_guide_are_valid() {
     let mut wrong = Vec::new();
     let mut count = [0; 3];
     for (name, command) in all_commands() {
@@ -118,7 +117,7 @@ fn command_lines_in_help_texts_and_in_the_guide_are_understood() {
             wrong.extend(error.map(|error| format!("{name}: {}: {error}", words.join(" "))));
         }
         for words in of_text {
-            // Of c|rust|python the first.
+            // The first of c|rust|python.
             let words: Vec<String> =
                 words.iter().map(|word| word.split('|').next().unwrap().to_owned()).collect();
             let error = parsed(&words).err().filter(|error| !is_abridged(error));
@@ -131,7 +130,7 @@ fn command_lines_in_help_texts_and_in_the_guide_are_understood() {
 }
 
 #[test]
-fn every_option_is_told_in_its_help_and_in_the_guide() {
+fn help_texts_and_the_guide_describe_every_option() {
     let guide = guide().into_iter().map(|(_, page)| page).collect::<String>();
     let words: Vec<&str> = guide
         .split(|c: char| !(c.is_ascii_alphanumeric() || c == '-'))
@@ -154,7 +153,7 @@ fn every_option_is_told_in_its_help_and_in_the_guide() {
     assert!(missing.is_empty(), "{}", missing.join("\n"));
 }
 
-/// How a help text looks, by the one that has a bit of everything.
+/// The layout of a help text, in an example with all elements.
 #[test]
 fn a_help_text() {
     let mut page = Page::default();

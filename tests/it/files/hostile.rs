@@ -1,5 +1,4 @@
-//! Files that are made to harm, or are none: each ends its command soon, in little memory, with one
-//! line that names it.
+//! Malicious and invalid files: each ends its command soon, in little memory, with one line that names it.
 
 use std::fs::{self, File};
 use std::io::{Cursor, Read, Write};
@@ -16,13 +15,13 @@ use flate2::{Compression, write::ZlibEncoder};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-/// Kills what hangs; tests may run on a slow machine that is busy.
+/// Time after which a command counts as hanging; tests may run on a slow, busy machine.
 const PATIENCE: Duration = Duration::from_secs(100);
 
-/// Most memory of a command, kB.
+/// Maximum memory of a command, kB.
 const MOST_KB: u64 = 1_000_000;
 
-/// `b.*` of a board, `s.*` of a solid, a camera and a detection.
+/// Valid files: `b.*` of a board, `s.*` of a solid, a camera and a detection.
 static GOOD: LazyLock<TempDir> = LazyLock::new(|| {
     let folder = TempDir::new().unwrap();
     let make = |args: &str| {
@@ -43,16 +42,16 @@ fn good(name: &str) -> Vec<u8> {
     fs::read(GOOD.path().join(name)).unwrap()
 }
 
-/// How a command ended.
+/// The end of a command.
 struct End {
-    /// `None` where it was killed, or killed itself.
+    /// `None` if it was killed by a signal.
     code: Option<i32>,
     said: String,
-    /// Most memory, where that can be known.
+    /// Maximum memory, if it can be measured.
     kb: Option<u64>,
 }
 
-/// Runs a command, in whose arguments `@` is a file of the folder, and `+` the folder of what is good.
+/// Runs a command. In its arguments, `@` is a file of the folder, and `+` is the folder of valid files.
 fn run(folder: &Path, command: &str, file: &str) -> End {
     let mut words = command.split(' ').map(|word| match word {
         "@" => file.to_owned(),
@@ -85,14 +84,14 @@ fn run(folder: &Path, command: &str, file: &str) -> End {
     End { code: status.and_then(|status| status.code()), said, kb }
 }
 
-/// The most memory that a running process had so far.
+/// The maximum memory of a running process so far.
 fn peak_kb(child: &Child) -> Option<u64> {
     let status = fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     line.split_whitespace().next()?.parse().ok()
 }
 
-/// What is wrong with the end of a command, where one of some codes is expected, and with code 2 a line.
+/// The problem with the end of a command, which must have one of the codes, and with code 2 one line of error.
 fn fault(end: &End, codes: &[i32]) -> Option<String> {
     let End { code, said, kb } = end;
     let lines = said.lines().count();
@@ -107,7 +106,7 @@ fn fault(end: &End, codes: &[i32]) -> Option<String> {
     Some(format!("{wrong}: code {code:?}, {kb:?} kB, {said}"))
 }
 
-/// Every reader of files but pictures: the extension, the command, and a good file.
+/// Every reader of files except images: the extension, the command, and a valid file.
 const READERS: [(&str, &str, &str); 20] = [
     ("json", "deltille verify @", "b.json"),
     ("dsc", "deltille detect --target @ +/b.png -o out", "b.dsc"),
@@ -135,7 +134,7 @@ const READERS: [(&str, &str, &str); 20] = [
     ("stl", "deltille verify +/s.json @", "s.stl"),
 ];
 
-/// Readers of which an empty file is a good one.
+/// Readers for which an empty file is valid.
 const READERS_OF_LINES: [(&str, &str, &str); 3] = [
     ("toml", "deltille board --rows 2 --cols 2 -o out --template @", ""),
     ("toml", "deltag gen-family d16h5 --time 1 -o out --rules @", ""),
@@ -143,7 +142,7 @@ const READERS_OF_LINES: [(&str, &str, &str); 3] = [
 ];
 
 #[test]
-fn whatever_is_no_such_file_is_named() {
+fn invalid_files_are_named() {
     let folder = TempDir::new().unwrap();
     let at = |name: &str| folder.path().join(name);
     let (mut faults, mut page) = (Vec::new(), Page::default());
@@ -161,7 +160,7 @@ fn whatever_is_no_such_file_is_named() {
             if !at(&name).exists() {
                 make(kind, &at(&name), sample);
             }
-            // What may be read has to be a good file.
+            // A file that is accepted must be valid.
             let is_read = ["noise", "empty", "half", "brackets"].contains(&kind);
             let codes: &[i32] = if is_read { &[1, 2] } else { &[2] };
             let end = run(folder.path(), command, &name);
@@ -181,7 +180,7 @@ fn whatever_is_no_such_file_is_named() {
     }
 }
 
-/// Makes what is no good file.
+/// Makes an invalid file.
 fn make(kind: &str, path: &Path, sample: &str) {
     match kind {
         "empty" => fs::write(path, "").unwrap(),
@@ -193,7 +192,7 @@ fn make(kind: &str, path: &Path, sample: &str) {
         }
         "half" => {
             let bytes = good(sample);
-            // Of a text behind a field: within a number it would depend on the digits.
+            // Text is cut after a field: within a number, the result would depend on the digits.
             let half = &bytes[..bytes.len() / 2];
             let comma = half.iter().rposition(|&b| b == b',').filter(|_| bytes[0] == b'{');
             fs::write(path, &half[..comma.map_or(half.len(), |at| at + 1)]).unwrap();
@@ -206,7 +205,7 @@ fn make(kind: &str, path: &Path, sample: &str) {
     }
 }
 
-/// Chunks of a PNG, grey of 8 bits unless it is said otherwise.
+/// Chunks of a PNG, by default grey with 8 bits.
 fn png(width: u32, height: u32, more: &[u8]) -> Vec<u8> {
     let size = [width.to_be_bytes(), height.to_be_bytes()].concat();
     let resolution = [11811u32.to_be_bytes(), 11811u32.to_be_bytes()].concat();
@@ -231,14 +230,14 @@ fn fabric() -> Vec<u8> {
     bytes.into_inner()
 }
 
-/// So many bytes of zero, packed a thousandfold.
+/// The given number of zero bytes, compressed a thousandfold.
 fn zeros(count: u64) -> Vec<u8> {
     let mut packed = ZlibEncoder::new(Vec::new(), Compression::best());
     std::io::copy(&mut std::io::repeat(0).take(count), &mut packed).unwrap();
     packed.finish().unwrap()
 }
 
-/// The good mesh with another JSON.
+/// The valid mesh with an edited JSON.
 fn glb(edit: impl Fn(&mut Value)) -> Vec<u8> {
     let mut parts = Parts::of(&good("s.glb"));
     let mut root: Value = serde_json::from_slice(&parts.json).unwrap();
@@ -247,7 +246,7 @@ fn glb(edit: impl Fn(&mut Value)) -> Vec<u8> {
     parts.join()
 }
 
-/// A chain of nodes, each of which has the next so many times for a child.
+/// A chain of nodes, each with the next node as child `times` times.
 fn chain(length: usize, times: usize) -> Vec<u8> {
     glb(|root| {
         let nodes = root["nodes"].as_array_mut().unwrap();
@@ -258,20 +257,20 @@ fn chain(length: usize, times: usize) -> Vec<u8> {
     })
 }
 
-/// The good SVG with more in it.
+/// The valid SVG with additional elements.
 fn svg(more: &str) -> Vec<u8> {
     let text = String::from_utf8(good("b.svg")).unwrap();
     text.replace("</svg>", &format!("{more}</svg>")).into_bytes()
 }
 
-/// The good SVG with an attribute of its first element changed.
+/// The valid SVG with a changed attribute of its first element.
 fn svg_with(from: &str, to: &str) -> Vec<u8> {
     let text = String::from_utf8(good("b.svg")).unwrap();
     assert!(text.contains(from), "{from}");
     text.replacen(from, to, 1).into_bytes()
 }
 
-/// Lines from end to end of a page, without an order.
+/// Unordered lines across a page.
 fn zigzag(first: &str, next: &str, after: &str) -> String {
     let to = |i: u64| format!("{next}{} {}{after}", i * 7919 % 297, i * 104_729 % 210);
     first.to_owned() + &(0..120_000).map(to).collect::<String>()
@@ -446,7 +445,7 @@ fn cameras_and_other_texts_are_defused() {
 }
 
 #[test]
-fn many_large_pictures_at_a_time_take_the_memory_of_one() {
+fn many_large_images_need_the_memory_of_one() {
     let folder = TempDir::new().unwrap();
     let picture = png(9000, 9000, &[]);
     for name in ["a.png", "b.png", "c.png", "d.png"] {

@@ -1,4 +1,4 @@
-//! Ctrl-C during a search: what is kept, and that going on from it finds the same.
+//! Ctrl-C during a search: the kept results, and resuming from them.
 
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use crate::common::folder::names;
 use crate::common::page::Page;
 
-/// Longer than any of these searches needs on a busy machine.
+/// Longer than any of these searches takes on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(300);
 
 fn start(arguments: &[&str], folder: &Path) -> Child {
@@ -45,7 +45,7 @@ fn verified(file: &Path) -> bool {
     command.arg("verify-family").arg(file).output().unwrap().status.success()
 }
 
-/// Interrupts a search at every checkpoint, again and again, until it ends by itself.
+/// Interrupts a search at every checkpoint, repeatedly, until it ends on its own.
 fn in_pieces(arguments: &[&str], folder: &Path, mut after: impl FnMut(&Output)) -> u32 {
     let checkpoint = folder.join("checkpoint");
     let resume = checkpoint.to_str().unwrap();
@@ -67,7 +67,7 @@ fn in_pieces(arguments: &[&str], folder: &Path, mut after: impl FnMut(&Output)) 
             }
             Some(130) => {
                 let stderr = text(&output.stderr);
-                // A slow machine tells its progress before that.
+                // A slow machine reports its progress first.
                 let last = stderr.lines().last().unwrap();
                 assert!(last.starts_with("interrupted: ") && last.contains(resume), "{stderr}");
                 after(&output);
@@ -79,7 +79,7 @@ fn in_pieces(arguments: &[&str], folder: &Path, mut after: impl FnMut(&Output)) 
 }
 
 #[test]
-fn a_lexicode_in_pieces_is_the_published_one() {
+fn an_interrupted_lexicode_is_the_published_one() {
     let folder = tempfile::tempdir().unwrap();
     let arguments = ["d25h7", "--method", "lexicode", "--name", "delTag25h7"];
     let pieces = in_pieces(&arguments, folder.path(), |_| {
@@ -93,7 +93,7 @@ fn a_lexicode_in_pieces_is_the_published_one() {
 }
 
 #[test]
-fn a_search_in_pieces_finds_what_it_finds_at_once() {
+fn an_interrupted_search_finds_the_same_codes() {
     let (folder, whole) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let arguments = ["d16h5", "--method", "search", "--rounds", "5", "--seed", "7"];
     let made = folder.path().join("d16h5.json");
@@ -112,7 +112,7 @@ fn a_search_in_pieces_finds_what_it_finds_at_once() {
 #[test]
 fn without_a_checkpoint_an_interrupted_lexicode_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
-    // Minutes of work, so that it is not done when the signal comes.
+    // Minutes of work, so it is not finished at the signal.
     let mut child = start(&["d36h9", "--method", "lexicode"], folder.path());
     wait_for("the signal handler", || handles_interrupts(&mut child));
     let output = interrupt(child);
@@ -123,7 +123,7 @@ fn without_a_checkpoint_an_interrupted_lexicode_leaves_nothing() {
     assert_eq!(names(folder.path()), [""; 0]);
 }
 
-/// The best family so far is kept, at least what ships, or, where a search from nothing had found none, nothing.
+/// The best family so far is kept, at least the shipped one; a search from scratch without a family keeps nothing.
 #[test]
 fn an_interrupted_best_search_keeps_the_best_so_far() {
     for (from, pause_ms, must_find) in [
@@ -152,7 +152,7 @@ fn an_interrupted_best_search_keeps_the_best_so_far() {
     }
 }
 
-/// The pages are there whole; not all were compared.
+/// The pages are complete, but not all were compared.
 #[test]
 fn an_interrupted_sheet_ends_between_pages() {
     let folder = tempfile::tempdir().unwrap();
@@ -167,11 +167,11 @@ fn an_interrupted_sheet_ends_between_pages() {
     assert_eq!(names(folder.path()), ["d25h7-sheet.pdf"]);
 }
 
-/// Whether a process has come to where Ctrl-C no longer just ends it.
+/// Whether a process has installed its handler of Ctrl-C.
 fn handles_interrupts(child: &mut Child) -> bool {
     assert!(child.try_wait().unwrap().is_none(), "it has ended");
     let Ok(status) = std::fs::read_to_string(format!("/proc/{}/status", child.id())) else {
-        // No such file elsewhere than on Linux: time has to do.
+        // This file exists only on Linux; elsewhere, wait.
         std::thread::sleep(Duration::from_secs(2));
         return true;
     };

@@ -1,4 +1,4 @@
-//! Names in the guide, in the types of the Python package and on the page are those of the library.
+//! Names in the guide, in the types of the Python package and on the web page match the library.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -15,13 +15,13 @@ fn read(path: &str) -> String {
     fs::read_to_string(Path::new(crate::common::REPOSITORY).join(path)).unwrap()
 }
 
-/// The words in quotes of what follows a text, up to its bracket.
+/// The quoted words after a text, up to the closing bracket.
 fn quoted<'a>(page: &'a str, before: &str) -> BTreeSet<&'a str> {
     let (_, listed) = page.split_once(before).unwrap_or_else(|| panic!("there is no {before}"));
     listed.split(']').next().unwrap().split('"').skip(1).step_by(2).collect()
 }
 
-/// The row of a table that begins with cells in which these are.
+/// The row of a table whose first cells contain these texts.
 fn row<'a>(page: &'a str, first: &str, second: &str) -> &'a str {
     let is_it = |line: &&str| {
         let mut cells = line.split('|').skip(1);
@@ -33,7 +33,7 @@ fn row<'a>(page: &'a str, first: &str, second: &str) -> &'a str {
 }
 
 #[test]
-fn types_of_python_are_the_names_of_the_library() {
+fn python_types_match_the_names_of_the_library() {
     let page = read("python/deltille/typing.py");
     let types = |name: &str| quoted(&page, &format!("{name}: TypeAlias = Literal["));
     assert_eq!(types("TargetFormat"), What::NAMED.map(|(name, _)| name).into());
@@ -54,24 +54,24 @@ fn types_of_python_are_the_names_of_the_library() {
 }
 
 #[test]
-fn models_and_their_formats_are_told_as_they_are() {
+fn the_guide_lists_models_and_formats_of_the_library() {
     let [formulation, calibration, recipes] =
         ["docs/formulation.md", "docs/calibration.md", "docs/recipes.md"].map(read);
     for (name, model) in Model::named() {
-        let told = row(&formulation, name, model.kind().name());
+        let line = row(&formulation, name, model.kind().name());
         let names = model.lens().names()[..model.found()].join(" ");
-        assert!(name == "spline" || told.contains(&names), "{told}: {names}");
+        assert!(name == "spline" || line.contains(&names), "{line}: {names}");
         assert!(calibration.contains(&format!("`{name}`")), "{name}");
         if let [first, ..] = model.richer() {
-            let told = row(&formulation, name, &first.to_string());
+            let line = row(&formulation, name, &first.to_string());
             let richer = model.richer().iter().map(|model| format!("`{model}`"));
-            assert!(told.contains(&richer.collect::<Vec<_>>().join(", ")), "{told}");
+            assert!(line.contains(&richer.collect::<Vec<_>>().join(", ")), "{line}");
         }
     }
     for format in CAMERA_FORMATS {
-        let told = row(&recipes, format.name(), &format!("camera{}", format.end));
+        let line = row(&recipes, format.name(), &format!("camera{}", format.end));
         let models = format.models().iter().map(|name| format!("`{name}`")).collect::<Vec<_>>();
-        assert!(told.contains(&models.join(", ")), "{told}");
+        assert!(line.contains(&models.join(", ")), "{line}");
     }
     let page = read("web/src/words.ts");
     let (_, listed) = page.split_once("    models: {\n").unwrap();
@@ -82,7 +82,7 @@ fn models_and_their_formats_are_told_as_they_are() {
 }
 
 #[test]
-fn paper_sizes_are_those_of_the_library() {
+fn paper_sizes_match_the_library() {
     let choice = PaperSize::choice();
     let (names, _) = choice.split_once(", or").unwrap();
     assert!(read("docs/printing.md").contains(names), "{names}");

@@ -1,5 +1,4 @@
-//! Numbers in files that are none: whatever they are changed to, a file is refused with the name of the
-//! field, or all that comes of it is finite.
+//! Changed numbers in files: either the file is refused with the name of the field, or all results are finite.
 
 use crate::common::view::tilted;
 use deltille::calibrate::{Calibration, Model, Reference, views};
@@ -17,7 +16,7 @@ use glam::DVec3;
 use rand::SeedableRng;
 use serde_json::Value;
 
-/// What numbers are changed to; what JSON cannot say is left out there.
+/// Replacements of numbers; values that JSON cannot represent are left out there.
 const HOSTILE: [&str; 13] = [
     "1e308",
     "-1e308",
@@ -34,7 +33,7 @@ const HOSTILE: [&str; 13] = [
     "-2147483648",
 ];
 
-/// Places of the numbers in a text, outside of quotes.
+/// Positions of the numbers in a text, outside quotes.
 fn numbers(text: &str) -> Vec<std::ops::Range<usize>> {
     let bytes = text.as_bytes();
     let in_number = |b: u8| b.is_ascii_digit() || b"+-.eE".contains(&b);
@@ -60,8 +59,8 @@ fn numbers(text: &str) -> Vec<std::ops::Range<usize>> {
     found
 }
 
-/// Texts that differ from this one in one number, each with what was changed; of long texts in every so
-/// many-th number, about `most` of them.
+/// Texts that differ from this one in one number, each with a description of the change. Of long texts, about `most` evenly
+/// sampled numbers are changed.
 fn changed(text: &str, most: usize) -> impl Iterator<Item = (String, String)> + use<'_> {
     let places = numbers(text);
     assert!(!places.is_empty());
@@ -76,12 +75,12 @@ fn changed(text: &str, most: usize) -> impl Iterator<Item = (String, String)> + 
     })
 }
 
-/// An error that a person can act on: a line, and not a long one.
+/// Asserts that an error is one short line.
 fn is_told(said: &str, what: &str) {
     assert!(!said.is_empty() && said.lines().count() == 1 && said.len() < 500, "{what}: {said}");
 }
 
-/// No number of a text is none; JSON writes `null` for those.
+/// Asserts that all numbers of a text are finite; JSON writes `null` for others.
 fn is_finite(text: &str, what: &str) {
     for word in text.split(|c: char| !(c.is_ascii_alphanumeric() || "+-.".contains(c))) {
         let none = matches!(word.to_lowercase().as_str(), "nan" | "inf" | "-inf" | "infinity");
@@ -126,7 +125,7 @@ fn solid() -> Printing {
     Target::build("solid", &TargetSpec::Solid(spec), Some(&family)).unwrap().into()
 }
 
-/// A solid that its triangles describe.
+/// A solid described by its triangles.
 fn mesh() -> Printing {
     let octahedron = Polyhedron::octahedron(120.0);
     let (mesh, _) = ClosedMesh::new(&octahedron.vertices_mm, &octahedron.faces).unwrap();
@@ -135,7 +134,7 @@ fn mesh() -> Printing {
     Target::build("mesh", &TargetSpec::Solid(spec), Some(&family)).unwrap().into()
 }
 
-/// A solid whose sides are numbers.
+/// A solid described by the lengths of its sides.
 fn cuboid() -> Printing {
     let shape = SolidShape::Cuboid(DVec3::new(90.0, 70.0, 60.0));
     let spec = SolidSpec { tiles: 6, ..SolidSpec::new(shape) };
@@ -143,7 +142,7 @@ fn cuboid() -> Printing {
     Target::build("cuboid", &TargetSpec::Solid(spec), Some(&family)).unwrap().into()
 }
 
-/// The solid as it is measured: poses with their covariances.
+/// The measured solid: poses with their covariances.
 fn measured() -> Printing {
     let mut target = solid();
     for panel in &mut target.target.panels {
@@ -210,7 +209,7 @@ fn lists() {
                 Err(error) => is_told(&error.to_string(), &what),
                 Ok(target) => {
                     is_finite_json(&target.to_json(), &what);
-                    // What is read can be written and read again.
+                    // A file that is read can be written and read again.
                     Printing::from_json(&target.to_json())
                         .unwrap_or_else(|e| panic!("{what}: {e}"));
                     is_finite(&dsc::write(&target, dsc::Dialect::Fork).unwrap(), &what);

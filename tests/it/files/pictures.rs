@@ -1,4 +1,4 @@
-//! What becomes of photographs whose files are damaged, or say more than their pixels.
+//! Photographs with damaged files or with metadata.
 
 use std::fs;
 use std::io::Cursor;
@@ -17,14 +17,14 @@ use tiff::tags::Tag;
 const WIDTH: u32 = 160;
 const HEIGHT: u32 = 120;
 
-/// A picture with something to see everywhere.
+/// An image with detail everywhere.
 fn picture() -> GrayImage {
     GrayImage::from_fn(WIDTH, HEIGHT, |x, y| image::Luma([(x * x / 7 + y * 3 + (x ^ y) * 5) as u8]))
 }
 
 fn encoded(format: ImageFormat) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
-    // WebP and JPEG are colour as cameras write them.
+    // WebP and JPEG have colours, like files of cameras.
     let image = DynamicImage::ImageLuma8(picture()).to_rgb8();
     image.write_to(&mut bytes, format).unwrap();
     bytes.into_inner()
@@ -60,7 +60,7 @@ fn gray(photograph: Photograph) -> Gray<u8> {
 }
 
 #[test]
-fn a_jpeg_of_which_a_part_is_missing_is_not_read_unless_that_is_accepted() {
+fn truncated_jpegs_are_refused_unless_damage_is_accepted() {
     let (folder, whole) = (Folder::new(), encoded(ImageFormat::Jpeg));
     assert_eq!(folder.read(&whole, false).unwrap().notes, FileNotes::default());
     let scan = whole.windows(2).position(|marker| marker == [0xFF, 0xDA]).unwrap() + 14;
@@ -68,7 +68,7 @@ fn a_jpeg_of_which_a_part_is_missing_is_not_read_unless_that_is_accepted() {
     let hole = |at: usize| [&whole[..at], &whole[at + 200..]].concat();
     let places = (scan..whole.len() - 2).step_by((whole.len() - scan) / 40);
     let holes = (scan..whole.len() - whole.len() / 4).step_by((whole.len() - scan) / 10).map(hole);
-    // As some programs and cameras end what they could not finish.
+    // Some programs and cameras end incomplete files like this.
     let ended = |end: usize| [&whole[..end], &[0xFF, 0xD9]].concat();
     let ended = (scan..whole.len() - 40).step_by((whole.len() - scan) / 10).map(ended);
     for damaged in places.map(cut).chain(holes).chain(ended) {
@@ -80,13 +80,13 @@ fn a_jpeg_of_which_a_part_is_missing_is_not_read_unless_that_is_accepted() {
         assert!(accepted.notes.damage.is_some(), "{of}");
         assert_eq!(gray(accepted).width(), WIDTH as usize, "{of}");
     }
-    // Without its last marker it still has all pixels.
+    // Without its last marker, it still has all pixels.
     let unended = folder.read(&cut(whole.len() - 2), false).unwrap();
     assert_eq!(unended, folder.read(&whole, false).unwrap());
 }
 
 #[test]
-fn a_jpeg_that_makes_more_pixels_than_it_has_is_damaged() {
+fn jpegs_with_surplus_data_are_damaged() {
     let (folder, whole) = (Folder::new(), encoded(ImageFormat::Jpeg));
     let pixels = folder.read(&whole, false).unwrap();
     let end = whole.len() - 2;
@@ -102,15 +102,15 @@ fn a_jpeg_that_makes_more_pixels_than_it_has_is_damaged() {
         assert!(matches!(error, ImageError::Damaged { .. }), "{error}");
         assert!(folder.read(&damaged, true).unwrap().notes.damage.is_some());
     }
-    // Cameras fill up what they send in whole words.
+    // Cameras pad their data to whole words.
     for fill in [&[0; 7][..], &[0xFF; 3], &[0; 500]] {
         assert_eq!(folder.read(&with(fill), false).unwrap(), pixels, "{fill:?}");
     }
 }
 
-/// Some programs leave bytes between the parts of a head that belong to neither.
+/// Some programs leave unused bytes between the parts of a header.
 #[test]
-fn padding_between_headers_hides_no_missing_part() {
+fn padding_between_headers_does_not_hide_damage() {
     let (folder, whole) = (Folder::new(), encoded(ImageFormat::Jpeg));
     let table = whole.windows(2).position(|marker| marker == [0xFF, 0xDB]).unwrap();
     let padded =
@@ -121,7 +121,7 @@ fn padding_between_headers_hides_no_missing_part() {
 }
 
 #[test]
-fn other_formats_are_read_whole_or_not_at_all() {
+fn other_formats_are_read_completely_or_not_at_all() {
     let folder = Folder::new();
     let formats = [
         ImageFormat::Png,
@@ -135,7 +135,7 @@ fn other_formats_are_read_whole_or_not_at_all() {
         let pixels = gray(folder.read(&whole, false).unwrap());
         assert_eq!(pixels.pixels(), picture().as_raw(), "{format:?}");
         for end in (1..whole.len()).step_by(whole.len() / 40) {
-            // What is missing may be words about the picture behind it.
+            // The missing part may be metadata after the pixels.
             if let Ok(read) = folder.read(&whole[..end], false) {
                 assert_eq!(gray(read), pixels, "{format:?}, {end} of {} bytes", whole.len());
             }
@@ -143,7 +143,7 @@ fn other_formats_are_read_whole_or_not_at_all() {
     }
 }
 
-/// A JPEG with an EXIF block that asks viewers to turn it.
+/// A JPEG with an EXIF block that asks viewers to rotate it.
 fn turned_jpeg(orientation: u8) -> Vec<u8> {
     let whole = encoded(ImageFormat::Jpeg);
     let mut exif = b"Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0".to_vec();
@@ -153,7 +153,7 @@ fn turned_jpeg(orientation: u8) -> Vec<u8> {
 }
 
 #[test]
-fn pixels_stay_where_the_sensor_had_them() {
+fn pixels_stay_in_sensor_orientation() {
     let folder = Folder::new();
     let plain = folder.read(&encoded(ImageFormat::Jpeg), false).unwrap();
     for orientation in 1..=8 {
@@ -164,7 +164,7 @@ fn pixels_stay_where_the_sensor_had_them() {
 }
 
 #[test]
-fn colour_profiles_and_gammas_change_no_pixel() {
+fn colour_profiles_and_gamma_do_not_change_pixels() {
     let (folder, whole) = (Folder::new(), encoded(ImageFormat::Png));
     let plain = folder.read(&whole, false).unwrap();
     let head = 8 + 25;
@@ -179,7 +179,7 @@ fn colour_profiles_and_gammas_change_no_pixel() {
     }
 }
 
-/// A TIFF of these pages, each of a kind: 0, or 1 for a smaller copy of another.
+/// A TIFF of these pages, each of a kind: 0, or 1 for a reduced copy of another.
 fn tiff_of(pages: &[u32]) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     let mut file = TiffEncoder::new(&mut bytes).unwrap();
@@ -208,7 +208,7 @@ fn a_tiff_has_one_page() {
 
 #[cfg(unix)]
 #[test]
-fn a_pipe_is_as_good_as_a_file() {
+fn pipes_are_read_like_files() {
     let folder = Folder::new();
     for format in [ImageFormat::Jpeg, ImageFormat::Png, ImageFormat::Tiff] {
         let (bytes, pipe) = (encoded(format), folder.0.path().join(format!("{format:?}")));

@@ -1,6 +1,5 @@
-//! Every reader of files is given good files, files that were found to do harm, and files with a
-//! few changes that keep their form. None may panic, end without a finding, or let in what it must
-//! not. The fuzz targets in `fuzz/` do the same for hours.
+//! Every reader gets valid files, files that were harmful before, and files with a few changes that keep their form. None may
+//! panic, end without a result, or accept an invalid file. The fuzz targets in `fuzz/` do the same for hours.
 
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -8,10 +7,10 @@ use std::path::Path;
 
 use crate::changed::{Dice, READERS, Reader};
 
-/// Changed files of each reader.
+/// Number of changed files for each reader.
 const CHANGED: u64 = 150;
 
-/// Reads a file; what panicked is named.
+/// Reads a file and returns the name of the reader if it panicked.
 fn harm(reader: &Reader, what: &str, bytes: &[u8]) -> Option<String> {
     let read = catch_unwind(AssertUnwindSafe(|| reader.read(bytes)));
     read.is_err().then(|| format!("{}: {what}", reader.name))

@@ -1,14 +1,14 @@
-//! The same commands write the same bytes, however many threads there are, in any locale and time zone, from
-//! any folder, and once more.
+//! The same commands write the same bytes, with any number of threads, in any locale and time zone, from any folder, and
+//! repeatedly.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 
-/// How commands are run.
+/// The environment of commands.
 struct Way {
-    /// In the folder itself, or from the one above it.
+    /// Whether commands run in the folder itself, or in its parent.
     from_above: bool,
     threads: &'static str,
     environment: &'static [(&'static str, &'static str)],
@@ -31,8 +31,8 @@ const WAYS: [Way; 3] = [
 const CAMERA: &str = "width: 640\nheight: 480\nfocal_px: [620, 620]\ncentre_px: [321, 238]\n\
                       distortion: [-0.1, 0.02]\n";
 
-/// Runs commands, of which `@` is the folder and `$` the number of threads, in a way, in a folder of their
-/// own; returns what they wrote and said.
+/// Runs commands in a new folder and returns their files and output. In the commands, `@` is the folder and `$` the number of
+/// threads.
 fn outcome(way: &Way, commands: &[String]) -> BTreeMap<String, Vec<u8>> {
     let above = tempfile::tempdir().unwrap();
     let folder = above.path().join("in");
@@ -49,7 +49,7 @@ fn outcome(way: &Way, commands: &[String]) -> BTreeMap<String, Vec<u8>> {
         let output = command.output().unwrap();
         assert!(output.status.success(), "{text}: {}", String::from_utf8_lossy(&output.stderr));
         for (what, said) in [("out", output.stdout), ("error", output.stderr)] {
-            // How far a search is after ten seconds is no result.
+            // The progress of a search after ten seconds is not reproducible.
             let said = String::from_utf8(said).unwrap().replace(prefix, "");
             let lines = said.lines().filter(|line| !line.contains(" %, "));
             let said = lines.collect::<Vec<_>>().join("\n");
@@ -72,7 +72,7 @@ fn collect(root: &Path, folder: &Path, files: &mut BTreeMap<String, Vec<u8>>) {
     }
 }
 
-/// Runs commands in all ways and compares what comes of them.
+/// Runs commands in all environments and compares the results.
 fn check(commands: &[String], least_files: usize) {
     let [first, others @ ..] = WAYS.map(|way| outcome(&way, commands));
     assert!(first.len() >= least_files + 2 * commands.len(), "{:?}", first.keys());
@@ -88,7 +88,7 @@ fn check(commands: &[String], least_files: usize) {
     }
 }
 
-/// Where two contents differ first.
+/// The first difference between two contents.
 fn difference(one: &[u8], other: &[u8]) -> String {
     let at = one.iter().zip(other).position(|(a, b)| a != b);
     let at = at.unwrap_or(one.len().min(other.len()));
@@ -100,7 +100,7 @@ fn difference(one: &[u8], other: &[u8]) -> String {
 }
 
 #[test]
-fn targets_and_what_verification_says_of_them() {
+fn targets_and_their_verification() {
     let commands = [
         "deltille board --rows 5 --cols 4 --pdf --svg --png --dsc --dpi 200 -o @board",
         "deltille verify @board/board.json --report @board-verified.json",
@@ -126,7 +126,7 @@ fn families() {
 #[test]
 fn detections_and_calibrations() {
     let mut commands = vec!["deltille board --rows 6 --cols 5 --no-verify -o @board".to_owned()];
-    // Pictures of one moment: the right camera stands 60 mm beside the left one.
+    // Images of one moment: the right camera is 60 mm beside the left one.
     let poses = [
         [3.13, 0.0, 0.0, -45.0, 45.0, 300.0],
         [2.7, 0.1, 0.1, -40.0, 45.0, 280.0],

@@ -1,4 +1,4 @@
-//! Whatever comes in, nothing panics, and what comes out is finite.
+//! No input causes a panic, and all results are finite.
 
 use std::path::Path;
 
@@ -81,7 +81,7 @@ fn files() -> Vec<String> {
     ]
 }
 
-/// Every reader of text on any text: none may panic. How many take it for theirs.
+/// Runs every reader of text on a text; none may panic. Returns the number of readers that accept it.
 fn read_all(text: &str) -> usize {
     let read = [
         Printing::from_json(text).is_ok(),
@@ -94,14 +94,14 @@ fn read_all(text: &str) -> usize {
 }
 
 #[test]
-fn each_file_is_taken_by_one_reader() {
+fn each_file_is_accepted_by_one_reader() {
     for file in files() {
         assert_eq!(read_all(&file), 1, "{file}");
     }
 }
 
-/// Files of `tests/corpus`, each of a kind and with the fault that its name says: no reader takes
-/// more memory or time over them than over a good one, and none panics.
+/// Files of `tests/corpus`, whose names state their kind and fault: no reader needs more memory or time than for a valid file,
+/// and none panics.
 #[test]
 fn recorded_faults_are_refused_or_read() {
     let mut files = 0;
@@ -123,7 +123,7 @@ fn recorded_faults_are_refused_or_read() {
     assert!(files > 30, "{files} files");
 }
 
-/// Brackets nested deeper than any reader follows.
+/// Brackets nested deeper than any reader allows.
 #[test]
 fn deep_nesting_is_refused() {
     for open in ["[", "{\"a\":", "{a: ", "- "] {
@@ -143,7 +143,7 @@ proptest! {
             ((mixed >> 40) % u64::from(levels)) as u16
         };
         let scale = (65_535 / (levels - 1)) as u16;
-        // Single pixels and blocks of five by five, which have corners of many kinds.
+        // Single pixels and blocks of 5 × 5, which have corners of many kinds.
         let images = [
             Gray::from_fn(width, height, |x, y| random(x, y).saturating_mul(scale)),
             Gray::from_fn(width, height, |x, y| random(x / 5, y / 5).saturating_mul(scale)),
@@ -155,7 +155,7 @@ proptest! {
         }
     }
 
-    /// Files with bytes changed, lost or doubled.
+    /// Files with changed, lost or repeated bytes.
     #[test]
     fn damaged_files_are_refused_or_read(
         pick in 0..6usize,
@@ -172,7 +172,7 @@ proptest! {
                 0 => bytes[at] = byte,
                 1 => bytes.truncate(at),
                 2 => drop(bytes.drain(at..(at + usize::from(byte)).min(bytes.len()))),
-                // Digits and signs where numbers stand hit more than random bytes do.
+                // Digits and signs in place of numbers find more faults than random bytes.
                 _ => bytes[at] = b"0123456789-e.,\"[]{}:"[usize::from(byte) % 20],
             }
         }

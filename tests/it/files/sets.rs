@@ -1,5 +1,4 @@
-//! What becomes of files that are there already, of runs that are killed or told to end, and of
-//! several that write to one folder.
+//! Existing files, runs that are killed or interrupted, and concurrent runs in one folder.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
@@ -16,7 +15,7 @@ use deltille::export::staging;
 const DELTILLE: &str = env!("CARGO_BIN_EXE_deltille");
 const DELTAG: &str = env!("CARGO_BIN_EXE_deltag");
 
-/// All files of a folder, in the folders within it as well, with their content.
+/// All files of a folder and its subfolders, with their content.
 fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut all = BTreeMap::new();
     for name in names(folder) {
@@ -36,7 +35,7 @@ fn run(program: &str, folder: &Path, args: &str) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
-/// Each command says in a line that a new folder has the name of a file, or that a device is none; nothing is written.
+/// Each command reports in one line that a new folder has the name of a file or a device; nothing is written.
 #[test]
 fn a_new_folder_with_the_name_of_a_file_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -65,12 +64,12 @@ fn a_new_folder_with_the_name_of_a_file_is_refused() {
         "-o /dev/full is not a folder; expected a folder, or a file that ends in .ndjson",
     );
     assert_eq!(names(at), before);
-    // Where it is there as a folder, it is meant.
+    // An existing folder is accepted.
     std::fs::create_dir(at.join("out.json")).unwrap();
     deltille(at, "board --rows 4 --cols 5 -o out.json --no-verify").success();
 }
 
-/// Every command replaces what it wrote itself, and nothing else without `--force`.
+/// Every command replaces its own files, and nothing else without `--force`.
 #[test]
 fn only_files_of_the_same_kind_are_replaced() {
     let folder = tempfile::tempdir().unwrap();
@@ -136,7 +135,7 @@ fn only_files_of_the_same_kind_are_replaced() {
 }
 
 #[test]
-fn another_board_of_the_same_name_says_what_is_left_of_the_first() {
+fn another_board_of_the_same_name_does_not_replace_the_first() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let time = |name: &str| at.join(name).metadata().unwrap().modified().unwrap();
@@ -144,7 +143,7 @@ fn another_board_of_the_same_name_says_what_is_left_of_the_first() {
     page.run(at, "deltille board --rows 4 --cols 4 --pdf --svg --png --dsc --no-verify");
     std::fs::write(at.join("board-2.png"), "not of a board").unwrap();
     let written = ["board.json", "board.pdf", "board.svg"].map(time);
-    // The same again, fewer files: nothing is left over, and nothing is touched.
+    // The same again with fewer files: nothing is left over, and nothing is touched.
     page.run(at, "deltille board --rows 4 --cols 4 --pdf --no-verify");
     assert_eq!(["board.json", "board.pdf", "board.svg"].map(time), written);
     // The prints of the first need its description.
@@ -154,7 +153,7 @@ fn another_board_of_the_same_name_says_what_is_left_of_the_first() {
     page.is("board-again");
 }
 
-/// A link stays as it is, or with `--force` becomes a file; what it leads to is never written.
+/// A link stays unchanged, or becomes a file with `--force`; its destination is never written.
 #[cfg(unix)]
 #[test]
 fn nothing_is_written_through_a_link() {
@@ -186,7 +185,7 @@ fn nothing_is_written_through_a_link() {
     page.is("links");
 }
 
-/// Of an image all results are written or none, and the count of failures is that of what is missing.
+/// All results of an image are written, or none; the count of failures is that of the missing images.
 #[test]
 fn results_of_an_image_appear_together() {
     let folder = tempfile::tempdir().unwrap();
@@ -202,7 +201,7 @@ fn results_of_an_image_appear_together() {
     assert_eq!(names(&at.join("out")), ["a.json", "a.overlay.png", "b.overlay.png"]);
 }
 
-/// What is repeated of a file is short.
+/// Quotes from a file are short.
 #[test]
 fn errors_quote_little_of_a_hostile_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -239,7 +238,7 @@ fn errors_quote_little_of_a_hostile_file() {
     }
 }
 
-/// Two boards that differ, by the content of all their files.
+/// Two boards with different contents of all their files.
 struct Boards {
     folder: tempfile::TempDir,
     sets: [BTreeMap<String, Vec<u8>>; 2],
@@ -269,14 +268,14 @@ impl Boards {
         command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
     }
 
-    /// Whether the folder holds one of the two and nothing else.
+    /// Whether the folder contains one of the two and nothing else.
     fn is_whole(&self) -> bool {
         self.sets.contains(&contents(self.folder.path()))
     }
 }
 
-/// Runs are killed at random moments: then a command that only reads the description finds the folder
-/// as it was, or as it was to become.
+/// Runs are killed at random moments. Afterwards, a command that only reads the description finds the old or the new state of
+/// the folder.
 fn kill(trials: u64) {
     let boards = Boards::new();
     let at = boards.folder.path();
@@ -296,7 +295,7 @@ fn kill(trials: u64) {
         left += u32::from(there.keys().any(|name| name.starts_with(".deltille-")));
         there.retain(|name, _| !name.starts_with(".deltille-"));
         mixed += u32::from(!boards.sets.contains(&there));
-        // It fails for want of a camera, once it has read the description.
+        // It fails because there is no camera, after it has read the description.
         deltille(at, "render board.json --camera none.yaml --eye 0,0,300").code(2);
         assert!(boards.is_whole(), "trial {trial}: {:?}", contents(at).keys());
     }
@@ -317,9 +316,9 @@ fn a_thousand_killed_runs_leave_no_mixture() {
     kill(1000);
 }
 
-/// What `kill -9` leaves in the moment between two renames is too rare to wait for.
+/// The leftovers of `kill -9` between two renames are simulated, because they are too rare.
 #[test]
-fn what_is_complete_is_finished_and_what_is_not_is_removed() {
+fn complete_sets_are_finished_and_others_removed() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let write = |name: &str, text: &str| {
@@ -338,7 +337,7 @@ fn what_is_complete_is_finished_and_what_is_not_is_removed() {
     write(".deltille-writing-of-mine/keep", "");
     let living = staging::Staging::new(at).unwrap();
     std::fs::write(living.files().join("b.txt"), "b").unwrap();
-    // A living run keeps what it has: here as seen by another process.
+    // A running process keeps its files, as seen by another process.
     deltille(at, "render a.json --camera none.yaml --eye 0,0,300").code(2);
     assert_eq!(std::fs::read(at.join("a.pdf")).unwrap(), b"new");
     assert_eq!(names(at).len(), 4, "{:?}", names(at));
@@ -347,7 +346,7 @@ fn what_is_complete_is_finished_and_what_is_not_is_removed() {
 }
 
 #[test]
-fn runs_at_the_same_time_do_not_mix() {
+fn concurrent_runs_do_not_mix() {
     let boards = Boards::new();
     for _ in 0..6 {
         let mut children = [0, 1, 0, 1].map(|which| boards.start(which));
@@ -356,11 +355,11 @@ fn runs_at_the_same_time_do_not_mix() {
     }
 }
 
-/// Longer than the half second that is asked for, on a machine that does other things as well.
+/// Longer than the required half second, on a busy machine.
 #[cfg(unix)]
 const SOON: Duration = Duration::from_secs(5);
 
-/// Whether these tests run under `nohup`, which their children inherit.
+/// Whether these tests run under `nohup`, which child processes inherit.
 #[cfg(unix)]
 fn ignores_hangup() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -368,10 +367,10 @@ fn ignores_hangup() -> bool {
     mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_none_or(|mask| mask & 1 == 1)
 }
 
-/// Work that takes much longer than that ends soon after any of the signals, and leaves nothing.
+/// Long work ends soon after any of the signals, and leaves nothing behind.
 #[cfg(unix)]
 #[test]
-fn signals_end_the_work_soon_and_leave_nothing() {
+fn signals_end_work_soon_and_leave_nothing() {
     let sheet = tempfile::tempdir().unwrap();
     deltille(sheet.path(), "board --rows 30 --cols 30 --png --dpi 600 --paper A2 --no-verify")
         .success();
@@ -411,7 +410,7 @@ fn signals_end_the_work_soon_and_leave_nothing() {
         assert_eq!(output.status.code(), Some(code), "{args}: {said}");
         assert!(said.starts_with("interrupted: ") && said.lines().count() == 1, "{args}: {said}");
         assert!(took < SOON, "{args}: {took:?}");
-        // Detections of pictures that were done in time stay.
+        // Detections of images that were finished in time stay.
         let is_done = |name: &String| args.starts_with("detect") && name.ends_with(".json");
         let left: Vec<String> = names(folder.path()).into_iter().filter(|n| !is_done(n)).collect();
         assert!(left.is_empty(), "{args}: {left:?}");
@@ -422,7 +421,7 @@ fn signals_end_the_work_soon_and_leave_nothing() {
 /// `detect --stream | head -1`
 #[cfg(unix)]
 #[test]
-fn work_whose_output_nobody_reads_ends() {
+fn work_ends_if_nobody_reads_its_output() {
     const IMAGES: usize = 60;
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
@@ -440,6 +439,6 @@ fn work_whose_output_nobody_reads_ends() {
     assert!(deltille::export::detection::read(&first).is_ok(), "{first}");
     let output = child.wait_with_output().unwrap();
     assert_eq!((output.status.code(), &*output.stderr), (Some(141), &b""[..]));
-    // One is read, one is written while the reader goes, one fails to be.
+    // One is read, one is written while the reader ends, one cannot be written.
     assert!(names(&at.join("out")).len() <= 5, "{:?}", names(&at.join("out")));
 }

@@ -1,5 +1,4 @@
-//! What the library says of its settings reaches the user as options, and what cannot be written is refused before the
-//! work.
+//! Messages of the library about settings name options, and outputs that cannot be written are refused before the work.
 
 use std::fs;
 
@@ -7,7 +6,7 @@ use crate::common::command::deltille;
 use crate::common::page::Page;
 
 #[test]
-fn messages_of_the_library_name_options_of_the_command_that_runs() {
+fn library_messages_name_the_options_of_the_command() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     deltille(at, "board --rows 8 --cols 9 --name board").success();
@@ -38,7 +37,7 @@ fn messages_of_the_library_name_options_of_the_command_that_runs() {
 }
 
 #[test]
-fn what_would_be_written_over_a_foreign_file_is_refused_before_anything_is_read() {
+fn foreign_outputs_are_refused_before_anything_is_read() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     deltille(at, "board --rows 8 --cols 9 --name board").success();
@@ -57,7 +56,7 @@ fn what_would_be_written_over_a_foreign_file_is_refused_before_anything_is_read(
     ] {
         fs::write(at.join(file), text).unwrap();
         page.refused(at, &format!("deltille {args}"));
-        // Then it is the folder that is missing.
+        // Now the folder is missing.
         page.refused(at, &format!("deltille {args} --force"));
         fs::remove_file(at.join(file)).unwrap();
     }
@@ -65,7 +64,7 @@ fn what_would_be_written_over_a_foreign_file_is_refused_before_anything_is_read(
 }
 
 #[test]
-fn cameras_whose_files_would_be_one_are_refused() {
+fn cameras_with_the_same_file_names_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let mut page = Page::default();
     for second in ["LEFT", "left", "Rig"] {

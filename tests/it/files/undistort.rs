@@ -1,4 +1,4 @@
-//! Pictures without distortion, and pairs with common rows. OpenCV is asked by `tests/independent/undistort.py`.
+//! Undistorted images and rectified pairs. `tests/independent/undistort.py` compares them with OpenCV.
 
 use std::fs;
 
@@ -8,7 +8,7 @@ use tempfile::TempDir;
 
 use crate::common::command::deltille;
 
-/// A folder with a camera and a picture in colours, 16 bits deep.
+/// A folder with a camera and a colour image with 16 bits per channel.
 fn folder() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let lens = BrownConrady { radial: [-0.2, 0.04, 0.0], ..BrownConrady::default() };
@@ -20,7 +20,7 @@ fn folder() -> TempDir {
 }
 
 #[test]
-fn colours_and_depth_stay_and_places_are_those_of_the_camera() {
+fn colours_and_depth_stay_and_positions_follow_the_camera() {
     let folder = folder();
     deltille(folder.path(), "undistort --camera camera.yaml photo.png --maps -o new").success();
     let new = folder.path().join("new");
@@ -30,7 +30,7 @@ fn colours_and_depth_stay_and_places_are_those_of_the_camera() {
         Camera::from_yaml(&fs::read_to_string(folder.path().join(name)).unwrap()).unwrap()
     };
     let (from, to) = (camera("camera.yaml"), camera("new/camera-undistorted.yaml"));
-    // The picture says where each of its pixels is.
+    // The values of the image encode the position of each pixel.
     for (x, y, colour) in picture.enumerate_pixels().filter(|(x, y, _)| x % 7 == 3 && y % 5 == 2) {
         let ray = to.unproject([f64::from(x), f64::from(y)].into()).unwrap().direction;
         let place = from.project(ray).unwrap();
@@ -40,7 +40,7 @@ fn colours_and_depth_stay_and_places_are_those_of_the_camera() {
     }
     let map = fs::read(new.join("camera-undistorted-map-y.npy")).unwrap();
     assert!(map.starts_with(b"\x93NUMPY") && map.len() == 128 + 4 * 320 * 240);
-    // Pictures that are there may be made anew, others are kept.
+    // Images of this program are replaced, others are kept.
     deltille(folder.path(), "undistort --camera camera.yaml photo.png -o new").success();
     fs::copy(folder.path().join("photo.png"), new.join("photo-undistorted.png")).unwrap();
     let refused = deltille(folder.path(), "undistort --camera camera.yaml photo.png -o new");
@@ -49,7 +49,7 @@ fn colours_and_depth_stay_and_places_are_those_of_the_camera() {
 }
 
 #[test]
-fn a_view_keeps_what_is_known_of_the_calibration_of_its_camera() {
+fn a_view_keeps_the_diagnoses_of_its_camera() {
     let folder = folder();
     let path = folder.path().join("camera.yaml");
     let read = |path| CameraFile::from_yaml(&fs::read_to_string(path).unwrap()).unwrap();
@@ -73,7 +73,7 @@ fn a_view_keeps_what_is_known_of_the_calibration_of_its_camera() {
 }
 
 #[test]
-fn what_cannot_be_shown_is_refused_in_a_line() {
+fn impossible_views_are_refused_in_one_line() {
     let folder = folder();
     let refused = |args: &str, words: &str| {
         let said = deltille(folder.path(), args).code(2);
@@ -91,7 +91,7 @@ fn what_cannot_be_shown_is_refused_in_a_line() {
     assert_eq!(left.len(), 2);
 }
 
-/// Files of the view are written with the pictures, or not at all where none could be made.
+/// The files of the view are written with the images, or not at all if no image could be made.
 #[test]
 fn a_damaged_photograph_leaves_nothing() {
     let folder = folder();

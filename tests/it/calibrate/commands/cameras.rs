@@ -182,8 +182,7 @@ fn images_without_a_board_are_reported_with_the_most_common_reason() {
         reasons(&[]),
     ];
     let folder = folder(&board(8, 9), &empty);
-    let why =
-        "no board of this kind found in 4 images; 2 of them: 1 tag not on the target, for example id 4";
+    let why = "no board of this kind found in 4 images; 2 of them: 1 tag not on the target, for example id 4";
     refused(folder.path(), CALIBRATE, &[why]);
     std::fs::create_dir(folder.path().join("b")).unwrap();
     let rig = "rig --camera a=corners --camera b=b --target board.json";
