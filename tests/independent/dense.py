@@ -1,10 +1,10 @@
-"""Patches of boards of place codes, drawn by cairo and seen by numpy: is every label that of the print?
+"""Patches of boards of position codes, drawn by cairo and seen by numpy: is every label that of the print?
 
     dense.py <program> <folder> [patches]
 
 Patches of about three by four tiles of a board of a thousand tiles, anywhere on it and turned at random, two pixels a
 cell, blurred by one: as they are, and with three of ten tiles painted over with cells of another kind. Then whole views
-of a board with place codes and of one without: are its corners as precise?
+of a board with position codes and of one without: are its corners as precise?
 """
 
 import json
@@ -136,7 +136,7 @@ def patches(program, folder, count):
 def precision(program, folder):
     sizes = ["--rows", "12", "--cols", "14", "--edge", "12mm"]
     boards = {
-        "with place codes": Board(program, folder, "codes", "--dense", *sizes),
+        "with position codes": Board(program, folder, "codes", "--dense", *sizes),
         "without": Board(program, folder, "plain", "--untagged", *sizes),
     }
     for edge_px in (15.0, 20.0, 30.0):
@@ -152,7 +152,7 @@ def precision(program, folder):
         print(f"tiles of {edge_px:g} px: {words}")
         # Cells take some pixels from corners where tiles are small.
         allowed = 1.5 if edge_px < 20 else 1.1
-        assert errors["with place codes"] < allowed * errors["without"]
+        assert errors["with position codes"] < allowed * errors["without"]
 
 
 def main():

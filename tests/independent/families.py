@@ -217,7 +217,7 @@ def main():
     program, names = sys.argv[1], [name for name in sys.argv[2:] if name != "--hidden"]
     named = [pathlib.Path(name) if name.endswith(".json") else FOLDER / f"{name}.json" for name in names]
     paths = named or sorted(FOLDER.glob("*.json"))
-    # Place codes are no family like others: tests/independent/dense.py.
+    # Position codes are no family like others: tests/independent/dense.py.
     paths = [path for path in paths if path.stem != "dense9"]
     for path in paths:
         check(path, program, "--hidden" in sys.argv)

@@ -79,7 +79,7 @@ fn boards_are_labelled_up_to_the_stated_distance() {
     }
 }
 
-/// Images of a printed board of place codes in which about twelve whole tiles are visible and nothing else.
+/// Images of a printed board of position codes in which about twelve whole tiles are visible and nothing else.
 struct Windows {
     page: PrintedPage,
     studio: Studio,
@@ -119,7 +119,7 @@ impl Windows {
     }
 }
 
-/// The same for patches of boards with place codes: a tenth closer than stated, at least half of them are labelled; a
+/// The same for patches of boards with position codes: a tenth closer than stated, at least half of them are labelled; a
 /// tenth farther away, at most half.
 #[test]
 fn patches_of_dense_boards_are_labelled_up_to_the_stated_distance() {

@@ -188,7 +188,7 @@ impl Family {
         }
     }
 
-    /// Creates the family of place codes, see [`places`].
+    /// Creates the family of position codes, see [`places`].
     fn places() -> Self {
         let cells = places::cells();
         let dimension = cells.dimension();
@@ -269,7 +269,7 @@ impl Family {
         (self.distance - 1) / 2
     }
 
-    /// Returns the codes; an id is a position in this list. For place codes these are the codes of the first board.
+    /// Returns the codes; an id is a position in this list. For position codes these are the codes of the first board.
     pub fn codes(&self) -> &[u64] {
         &self.codes
     }
@@ -304,13 +304,13 @@ impl Family {
     }
 
     /// Returns the number of unordered pairs, among the codes and their rotations, at each distance. It is empty for
-    /// families of more than 100,000 codes, and for place codes.
+    /// families of more than 100,000 codes, and for position codes.
     pub fn histogram(&self) -> &BTreeMap<u32, u64> {
         &self.histogram
     }
 
     /// Returns the probability that a word of fair coin tosses is mistaken for a tag, for 0, 1, …,
-    /// [`Self::correctable`] corrected bits. For place codes, every word is the word of a place. Image content is
+    /// [`Self::correctable`] corrected bits. For position codes, every word is the word of a place. Image content is
     /// rarely that complex: see [`Self::natural_false_positive_rates`].
     pub fn false_positive_rates(&self) -> Vec<f64> {
         if self.is_of_places() {

@@ -29,7 +29,7 @@ pub(crate) fn add(target: &Target, sheets: &mut [SheetLayout]) -> Result<(), Tar
         );
     }
     if target.family.as_ref().is_some_and(|family| family.name == places::NAME) {
-        return refused("place codes have no ids to print: omit this setting".to_owned());
+        return refused("position codes have no ids to print: omit this setting".to_owned());
     }
     for panel in &target.panels {
         if panel.inverted || panel.tags_in == TagsIn::White {

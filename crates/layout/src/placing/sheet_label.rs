@@ -62,7 +62,7 @@ fn size_in_words(name: &str, spec: &BoardSpec) -> Vec<String> {
     ]
 }
 
-/// Describes tags in words: `d25h7 id 3`, `d25h7 ids 3–7`. Place codes, whose ids are positions, are described by their
+/// Describes tags in words: `d25h7 id 3`, `d25h7 ids 3–7`. Position codes, whose ids are positions, are described by their
 /// family alone.
 pub fn tag_range(family: &str, first: u32, last: u32) -> String {
     match (family, first == last) {

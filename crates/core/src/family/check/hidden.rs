@@ -130,7 +130,7 @@ impl std::str::FromStr for Robust {
 
 impl Family {
     /// Returns the minimum distance of two codes, in any rotation, with these cells hidden at any position. Compares
-    /// all pairs. Returns `None` for square tags and place codes.
+    /// all pairs. Returns `None` for square tags and position codes.
     ///
     /// ```
     /// use deltille_core::family::{Family, HiddenCells};

@@ -168,7 +168,7 @@ impl NaturalWords {
 
 impl Family {
     /// Returns the probability that a bordered triangle in a natural image is mistaken for a tag, for 0, 1, …,
-    /// [`Self::correctable`] corrected bits. Returns `None` for square tags and place codes. In contrast,
+    /// [`Self::correctable`] corrected bits. Returns `None` for square tags and position codes. In contrast,
     /// [`Self::false_positive_rates`] assumes fair coin tosses. Above some 100,000 words, the words near the codes
     /// are sampled, always in the same way; the rates are then accurate to 10 %.
     pub fn natural_false_positive_rates(&self) -> Option<Vec<f64>> {

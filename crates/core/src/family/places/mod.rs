@@ -1,4 +1,4 @@
-//! Place codes: nine cells in every tile. Together with those of some neighbours, they identify the board, the
+//! Position codes: nine cells in every tile. Together with those of some neighbours, they identify the board, the
 //! position on it and its rotation.
 //!
 //! Take the field F of q³ = 2²⁴ elements, q = 256, and σ(x) = x^q, an automorphism of order three. An element α of
@@ -33,7 +33,7 @@ use std::sync::LazyLock;
 use crate::lattice::{Dimension, TagCells, Vertex};
 pub use distances::{PatchCertificate, PlaceDistances, certify_places, distances, patches};
 
-/// Name of the family of place codes.
+/// Name of the family of position codes.
 pub const NAME: &str = "dense9";
 
 /// Number of cells of a tile.
@@ -133,7 +133,7 @@ fn weights(cells: &TagCells) -> [u32; BITS as usize] {
     weights
 }
 
-/// Returns the cells of place codes.
+/// Returns the cells of position codes.
 pub(super) fn cells() -> TagCells {
     TagCells::new(Dimension::from_bits(BITS).expect("nine cells make a tag"))
 }

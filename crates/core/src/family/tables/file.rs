@@ -87,10 +87,10 @@ pub(in crate::family) fn from_json(json: &str) -> Result<Family, FamilyError> {
     }
     let file: FamilyFile = serde_json::from_str(json)?;
     if file.construction == Construction::Places {
-        // Place codes are computed and not listed.
+        // Position codes are computed and not listed.
         let known = Family::places();
         if (&file.name, &file.fingerprint) != (&known.name, &known.fingerprint) {
-            let problem = format!("only {} has place codes", known.name);
+            let problem = format!("only {} has position codes", known.name);
             return Err(FamilyError::field("construction", problem));
         }
         return Ok(known);

@@ -39,7 +39,7 @@ impl TagLabeller {
             };
             shown.code[0] > CLEARLY_OTHER && !is_predicted && (shown.is_foreign || is_of_panel())
         };
-        // Place codes are many and similar: a misread code is another code.
+        // Position codes are many and similar: a misread code is another code.
         let readings = 0..sight.readings.len();
         let elsewhere = readings.filter(|&index| !self.is_dense && is_elsewhere(index)).count();
         let beyond = if self.panels_abut { 0 } else { self.beyond(sight, grid, placement) };

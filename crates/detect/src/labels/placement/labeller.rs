@@ -70,9 +70,9 @@ pub(crate) struct TagLabeller {
     pub(super) readers: Vec<TagReader>,
     /// Name of the family.
     pub(super) family: String,
-    /// Whether every tile has a place code.
+    /// Whether every tile has a position code.
     pub(super) is_dense: bool,
-    /// Decoder of the whole family; `None` for place codes, because each of their words is a code.
+    /// Decoder of the whole family; `None` for position codes, because each of their words is a code.
     pub(super) decoder: Option<Decoder>,
     /// Probabilities of words in natural images, for triangular tags of which one alone identifies a position.
     pub(super) natural: Option<NaturalWords>,
@@ -153,7 +153,7 @@ impl TagLabeller {
             target.panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id).collect();
         let coded: BTreeMap<u32, u64> =
             ids.into_iter().filter_map(|id| Some((id, family.code(id)?))).collect();
-        // Many positions of a board of place codes show the same.
+        // Many positions of a board of position codes show the same.
         let mut shown = BTreeSet::new();
         let ids: Vec<u32> =
             coded.iter().filter(|&(_, code)| shown.insert(code)).map(|(&id, _)| id).collect();
