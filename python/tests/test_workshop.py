@@ -109,7 +109,7 @@ def test_the_kalibr_file_describes_the_grid():
     assert {key: value.strip() for key, value in fields.items()} == {
         "target_type": "'aprilgrid'", "tagCols": "6", "tagRows": "5", "tagSize": "0.024", "tagSpacing": "0.25", "codeOffset": "7"}
     for other in (deltille.AprilGrid((6, 5), tag_border=1), deltille.Board(4, 5)):
-        with pytest.raises(deltille.TargetError, match="Kalibr"):
+        with pytest.raises(deltille.TargetError, match="Kalibr cannot read"):
             other.files("kalibr")
 
 
