@@ -64,7 +64,7 @@ pub(in crate::report) fn uncertainty(camera: &CameraEstimate) -> String {
         ))
     });
     let body = format!(
-        "{}<div class=\"wide-table\"><table class=\"plain\"><tr><th>distance</th><th class=\"words\">1σ from</th><th>px</th></tr>{}</table></div>\
+        "{}<div class=\"wide-table\"><table class=\"plain\"><tr><th>distance</th><th class=\"words\">source</th><th>1σ, px</th></tr>{}</table></div>\
          <p class=\"note\">Standard deviation per axis within the region with corners, after the camera motion that fits the \
          corners best.</p>",
         html::figures(drawn),
