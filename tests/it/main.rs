@@ -11,6 +11,7 @@ mod families;
 mod files;
 mod make;
 mod verify;
+mod vocabulary;
 
 /// Files that are changed so that they keep their form; the fuzz targets share them.
 #[path = "../../fuzz/src/files/mod.rs"]
