@@ -15,7 +15,7 @@ impl Camera {
     /// ```
     /// use deltille_core::camera::{BrownConrady, Camera, Lens};
     ///
-    /// r (1 − r²/3) folds back at r = 1, where its value is 2/3.
+    /// // r (1 − r²/3) folds back at r = 1, where its value is 2/3.
     /// let lens = BrownConrady { radial: [-1.0 / 3.0, 0.0, 0.0], ..BrownConrady::default() };
     /// let camera = Camera::centred(1600, 1200, 900.0, Lens::BrownConrady(lens));
     /// assert!((camera.steady_px().unwrap() - 600.0).abs() < 1e-6);

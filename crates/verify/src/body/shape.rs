@@ -168,7 +168,7 @@ fn check_triangles(
         let [found, stated] = [body.volume_mm3, volume_mm3].map(|mm3| mm3 / 1e3);
         let scale = (found / stated).cbrt();
         let problem =
-            format!("volume of {found:.1} cm³ instead of {stated:.1} cm³(scale {scale:.4})");
+            format!("volume of {found:.1} cm³ instead of {stated:.1} cm³ (scale {scale:.4})");
         findings.push(MeshFinding::Body { problem }.into());
         return;
     }

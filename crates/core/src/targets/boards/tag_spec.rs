@@ -15,7 +15,7 @@ pub const MOST_ROWS: u32 = 500;
 /// Smallest hole in a tag, mm: for a thin pin.
 const LEAST_HOLE_MM: f64 = 0.5;
 
-/// Fewest tiles of a board of place codes: three by four identify their position even if some are hidden.
+/// Fewest tiles of a board of position codes: three by four identify their position even if some are hidden.
 pub(super) const LEAST_DENSE_TILES: u32 = 12;
 
 /// Least border of a square tag, bit-widths: that of an AprilTag.
@@ -32,7 +32,7 @@ pub struct TagSpec {
     /// Family name, or path of a family file. With [`places`] every tile has a tag, whose id follows from the board
     /// id and the position.
     pub family: String,
-    /// Id of the first tag; the others follow by row, then column, board after board. It is 0 for place codes.
+    /// Id of the first tag; the others follow by row, then column, board after board. It is 0 for position codes.
     pub first_id: u32,
     /// Distance between tags in rows and columns.
     pub spacing: u32,
@@ -68,7 +68,7 @@ impl Default for TagSpec {
 }
 
 impl TagSpec {
-    /// Returns a place code in every tile of a deltille grid, with the usual border. From 2 px per cell on, corners
+    /// Returns a position code in every tile of a deltille grid, with the usual border. From 2 px per cell on, corners
     /// are as precise as without codes.
     pub fn dense() -> Self {
         Self { family: places::NAME.to_owned(), spacing: 1, ..Self::default() }
@@ -85,7 +85,7 @@ impl TagSpec {
         Self { family, ..usual }
     }
 
-    /// Returns whether every tile has a place code.
+    /// Returns whether every tile has a position code.
     pub fn is_dense(&self) -> bool {
         self.family == places::NAME
     }
@@ -105,7 +105,7 @@ impl TagSpec {
         tiles.map(of_tile).collect()
     }
 
-    /// Checks that place codes exist for panels with these ids, with the given numbers of rows and columns of tiles.
+    /// Checks that position codes exist for panels with these ids, with the given numbers of rows and columns of tiles.
     /// `ids` and `size` are the settings that determine them.
     pub(crate) fn check_places(
         &self,
@@ -133,8 +133,8 @@ impl TagSpec {
             return Err(TargetError::invalid(size, problem));
         }
         let fixed = [
-            (TagSpacing, self.spacing, 1, "every tile has a place code"),
-            (TagFirstId, self.first_id, 0, "the ids of place codes follow from the board id"),
+            (TagSpacing, self.spacing, 1, "every tile has a position code"),
+            (TagFirstId, self.first_id, 0, "the ids of position codes follow from the board id"),
         ];
         match fixed.into_iter().find(|(_, value, only, _)| value != only) {
             Some((setting, value, only, why)) => {
