@@ -84,9 +84,10 @@ fn sources(root: &Path) -> Vec<PathBuf> {
     .to_vec();
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
+            let entry = entry.unwrap();
+            let (path, is_folder) = (entry.path(), entry.file_type().unwrap().is_dir());
             let extension = path.extension().unwrap_or_default();
-            if path.is_dir() {
+            if is_folder {
                 folders.push(path);
             } else if ["rs", "md", "py", "pyi", "ts"].iter().any(|kind| extension == *kind) {
                 found.push(path);

@@ -109,11 +109,11 @@ fn holes_without_room_are_rejected() {
     for (arguments, problem) in [
         (
             "board --rows 4 --cols 5 --hole 2mm",
-            "--hole: the codes of delTag25h7 use the cells in the middle",
+            "--hole: the codes of delTag25h7 use the central cells",
         ),
         (
             "board --rows 4 --cols 5 --edge 40mm --family families/holed.json --hole 5mm",
-            "have room for a hole of at most 2.44 mm",
+            "fit a hole of at most 2.44 mm",
         ),
         (
             "board --rows 4 --cols 5 --edge 40mm --family families/holed.json --hole 0.1mm",

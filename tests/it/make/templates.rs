@@ -178,7 +178,7 @@ fn options_override_the_meshes_lasers_and_inks_of_a_template() {
         ("rows = 4\ncols = 5\n[laser]\nkerf = \"1mm\"\n", "--kerf needs"),
         ("rows = 4\ncols = 5\nplate = \"3mm\"\n", "--plate needs"),
         ("rows = 4\ncols = 5\n[finishing]\nwhite = \"Black\"\n", "--white: `Black`"),
-        ("rows = 4\n[plate]\nmm = 3\n", "line 2, `plate`: an object"),
+        ("rows = 4\n[plate]\nmm = 3\n", "line 2, `plate`: expected a string, found an object"),
         (
             "rows = 4\ncols = 5\nuntagged = true\nfamily = \"d25h7\"\n",
             "--untagged conflicts with --family; remove one of them",

@@ -336,7 +336,7 @@ fn boards_of_a_list_without_poses_are_independent() {
     let result = output(at, "calibrate none.json --target cube.dsc --model radtan");
     let stderr = String::from_utf8_lossy(&result.stderr).into_owned();
     assert!(stderr.contains("the poses of its 3 boards on the target are missing"), "{stderr}");
-    assert!(stderr.contains("put cube.tp beside it"), "{stderr}");
+    assert!(stderr.contains("put cube.tp beside this file"), "{stderr}");
 
     let poses = "#calibration date\n0\n1 0 0 0\n0 1 0 0\n0 0 1 0\n1\n 0 0 -1 617.5\n0 1 0 4\n1 0 0 12\n\
                  2\n0 0 1 -10\n0 1 0 3\n-1 0 0 618\n7\n1 0 0 0\n0 1 0 0\n0 0 1 0\n";
