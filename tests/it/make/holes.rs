@@ -123,7 +123,7 @@ fn holes_without_room_are_rejected() {
         ("board --rows 4 --cols 5 --dense --hole 2mm", "--hole"),
         (
             "board --rows 4 --cols 5 --edge 40mm --family families/holed.json --hole 2mm --two-sided 3mm",
-            "--two-sided: a hole through a tag of one side would be in a tile of the other",
+            "--two-sided: a hole through a tag of one side would cut into a tile of the other",
         ),
         ("cube --hole 2mm", "--hole: square tags have no free cells"),
     ] {
