@@ -196,7 +196,7 @@ mod tests {
         assert!(unpacked_bytes(&two[..40], 10).unwrap_err().contains("too soon"));
         assert!(unpacked_bytes(&page(100, 7, 7, 101, 0), 1000).unwrap_err().contains("dictionary"));
         assert!(unpacked_bytes(&page(100, 7, 7, 11, 0), 10).unwrap_err().contains("dictionary"));
-        assert!(unpacked_bytes(&page(100, 7, 5, 9, 5), 10).unwrap_err().contains("differences"));
+        assert!(unpacked_bytes(&page(100, 7, 5, 9, 5), 10).unwrap_err().contains("delta-encoded"));
         assert!(unpacked_bytes(&[0xff; 40], 10).unwrap_err().contains("header"));
         assert!(unpacked_bytes(&[0x1c; 40], 10).unwrap_err().contains("header"));
     }
