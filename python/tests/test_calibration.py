@@ -221,7 +221,7 @@ def test_failures_are_skipped(pictures, board):
 
 def test_labels_of_another_target_are_rejected(detections):
     other = deltille.Board(9, 8, edge_mm=20)
-    with pytest.raises(deltille.DetectionError, match="it was detected as desk .* but the target given is board"):
+    with pytest.raises(deltille.DetectionError, match="it was detected as desk .* but the given target is board"):
         deltille.Detection.from_json(detections[0].to_json(), target=other)
 
 
