@@ -215,7 +215,7 @@ pub enum CalibrationError {
     Stopped,
     /// Parameters that the views do not determine.
     #[error(
-        "the views do not determine {parameters}: tilt the board more, fill the corners of the image, \
+        "the views do not determine {parameters}: tilt the board more, place it in the four corners of the image, \
          or choose another model (this one has too many parameters, or does not fit the lens)"
     )]
     Undetermined {

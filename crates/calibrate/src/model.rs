@@ -114,7 +114,7 @@ const MODELS: [Facts; 9] = [
         model: Model::Radtan5,
         lens: LensKind::BrownConrady,
         found: 5,
-        help: "and k3",
+        help: "radtan and k3",
         richer: &[Model::Rational, Model::ThinPrism, Model::KannalaBrandt(TERMS)],
         ..PLAIN
     },
@@ -123,7 +123,7 @@ const MODELS: [Facts; 9] = [
         model: Model::Rational,
         lens: LensKind::BrownConrady,
         found: 8,
-        help: "and k4 k5 k6",
+        help: "radtan5 and k4 k5 k6",
         richer: &[Model::ThinPrism, Model::KannalaBrandt(TERMS)],
         ..PLAIN
     },
@@ -131,7 +131,7 @@ const MODELS: [Facts; 9] = [
         name: "thin-prism",
         model: Model::ThinPrism,
         lens: LensKind::BrownConrady,
-        help: "and s1 … s4",
+        help: "rational and s1 … s4",
         richer: &[Model::KannalaBrandt(TERMS)],
         ..PLAIN
     },
@@ -139,7 +139,7 @@ const MODELS: [Facts; 9] = [
         name: "kannala-brandt",
         model: Model::KannalaBrandt(TERMS),
         lens: LensKind::KannalaBrandt,
-        help: "4 terms; kannala-brandt-5 …",
+        help: "4 terms; kannala-brandt-5 to kannala-brandt-12 for more",
         forms: "4 terms; kannala-brandt-5 to kannala-brandt-12",
         richer: &[Model::KannalaBrandt(MORE_TERMS), Model::Pupil],
         ..PLAIN

@@ -112,7 +112,7 @@ pub fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
 /// Treatment of existing files. Files of the same kind are always replaced.
 #[derive(clap::Args, Clone, Copy, Default)]
 pub struct Overwrite {
-    /// Also replace files of another kind, or that other programs wrote
+    /// Overwrite existing files of any type, whichever program wrote them
     #[arg(long)]
     force: bool,
 }

@@ -241,7 +241,7 @@ impl<'a> Words<'a> {
             LackOfFit::Lens { camera, rms_px } => {
                 let lens = other_lens(self.model(camera));
                 let text = format!(
-                    "residuals form a pattern of {rms_px:.3} px RMS over the image: {lens}"
+                    "residuals vary systematically over the image, by {rms_px:.3} px RMS: {lens}"
                 );
                 self.of_camera(camera, text)
             }
@@ -431,7 +431,9 @@ fn stretched(stretch: &BoardStretch) -> String {
 fn ill_conditioned(parameters: &[String], sufficient: Option<Model>) -> String {
     let advice = match sufficient {
         Some(model) => format!("use {CalibrateModel} {model}, which fits this lens equally well"),
-        None => "fill the corners of the image, or choose a model with fewer parameters".to_owned(),
+        None => "place the board in the four corners of the image, or choose a model with fewer \
+                 parameters"
+            .to_owned(),
     };
     format!(
         "the views do not distinguish {} (ill-conditioned): their values have no meaning on their own; the \

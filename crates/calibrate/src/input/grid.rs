@@ -59,7 +59,7 @@ impl UntaggedGrid {
             )),
             Some(seen) if self.size.is_some_and(|[rows, cols]| rows * cols != seen.corners) => {
                 Err(format!(
-                    "it was detected as {seen}, but a board of {} corners is given by {UntaggedGridSize}: {}",
+                    "it was detected as {seen}, but the board specified by {UntaggedGridSize} has {} corners: {}",
                     self.size.map_or(0, |[rows, cols]| rows * cols),
                     assume_target()
                 ))

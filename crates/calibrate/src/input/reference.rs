@@ -322,12 +322,12 @@ fn check_panel(target: &Target, panel: &Panel, grid: &Grid) -> Result<(), String
         {
             let swapped = (of_target.col, of_target.row) == (corner.row, corner.col);
             return Err(format!(
-                "corner {id} is in row {}, column {}, but on {} in row {}, column {}{}",
+                "corner {id}: row {}, column {} in the detection, but row {}, column {} on {}{}",
                 corner.row,
                 corner.col,
-                target.name,
                 of_target.row,
                 of_target.col,
+                target.name,
                 if swapped { " (rows and columns exchanged?)" } else { "" }
             ));
         }

@@ -39,19 +39,19 @@ enum Command {
     /// Search for a family such as d25h7 and write its file
     #[command(after_help = gen_family::HELP, mut_arg("force", |arg| arg.help(gen_family::FORCE)))]
     GenFamily(gen_family::Args),
-    /// Verify the claims of family files from their codes
+    /// Recompute the stated properties of family files from their codes
     #[command(after_help = verify_family::HELP)]
     VerifyFamily(verify_family::Args),
     /// Describe a family, or compute the distance between two
     Info(info::Args),
-    /// List complexity rules with the codes they leave and their natural false-positive rates
+    /// List complexity rules: the number of codes that satisfy each rule, and its false-positive rate in natural images
     #[command(after_help = frontier::HELP)]
     Frontier(frontier::Args),
     /// Print upper bounds on the size of a family, and compare the shipped families with them
     Bounds(bounds::Args),
     /// Find the smallest shipped family for a target
     Plan(plan::Args),
-    /// Print tags of a linear family by rank, including those not listed in its file
+    /// Print tags of a linear code by index in its enumeration, including those not listed in its file
     ByRank(by_rank::Args),
     /// Export a family for another program
     Export(export::Args),

@@ -347,7 +347,8 @@ pub enum SetError {
     },
     /// The description of another board exists.
     #[error(
-        "{} describes another board, {board}, whose prints need it: choose another name or folder to keep both, or set `overwrite`",
+        "{} describes another board, {board}; without it, existing prints of that board cannot be used: choose another name \
+         or folder to keep both, or set `overwrite`",
         path.display()
     )]
     Board {

@@ -315,9 +315,10 @@ fn superfluous(camera: &CameraEstimate, add: &mut impl FnMut(Weight, String)) {
         let weak = |p: &&Parameter| p.sd.is_some_and(|sd| p.value.abs() < SIGNIFICANT * sd);
         if more.iter().all(weak) {
             let names: Vec<&str> = more.iter().map(|p| p.name.as_str()).collect();
+            let (verb, them) = if names.len() == 1 { ("does", "it") } else { ("do", "them") };
             let text = format!(
-                "Not significantly different from zero: {}. The simpler model {smaller} extrapolates more \
-                 safely to regions without corners.",
+                "{} {verb} not differ significantly from zero: the simpler model {smaller}, without {them}, extrapolates \
+                 more safely to regions without corners.",
                 names.join(", ")
             );
             add(Weight::Hint, text);
@@ -503,9 +504,18 @@ mod tests {
     #[test]
     fn a_smaller_model_is_advised_if_one_exists() {
         for (model, text) in [
-            (Model::Radtan5, "from zero: k3. The simpler model radtan extrapolates"),
-            (Model::Rational, "from zero: k4, k5, k6. The simpler model radtan5 extrapolates"),
-            (Model::KannalaBrandt(5), "from zero: k5. The simpler model kannala-brandt extra"),
+            (
+                Model::Radtan5,
+                "k3 does not differ significantly from zero: the simpler model radtan, without it,",
+            ),
+            (
+                Model::Rational,
+                "k4, k5, k6 do not differ significantly from zero: the simpler model radtan5, without",
+            ),
+            (
+                Model::KannalaBrandt(5),
+                "k5 does not differ significantly from zero: the simpler model kannala-brandt, ",
+            ),
         ] {
             assert!(advised(model).contains(text), "{}", advised(model));
         }

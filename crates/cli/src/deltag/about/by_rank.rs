@@ -12,7 +12,7 @@ use deltille::family::{self, Construction, Screen, TagWords};
 pub struct Args {
     /// A shipped family such as d49h12, or a family file
     family: String,
-    /// Rank of the first tag, counted from 0
+    /// Index of the first tag in the enumeration, counted from 0
     #[arg(long, allow_negative_numbers = true, value_parser = whole(0..=u64::MAX))]
     rank: u64,
     /// Number of tags to print
@@ -24,14 +24,14 @@ pub struct Args {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let family = deltags(family::resolve(&args.family)?)?;
     let Construction::Algebraic(construction) = family.construction() else {
-        anyhow::bail!("{}: only codes of an algebraic family have ranks", args.family);
+        anyhow::bail!("{}: only codes of a linear family can be enumerated by index", args.family);
     };
     let words = TagWords::new(family.dimension());
     let screen = Screen::new(words.clone(), family.distance(), family.rules());
     for rank in args.rank..=args.rank.saturating_add(args.count - 1) {
         let (word, count) = construction.by_rank(family.dimension(), rank).with_context(|| {
             format!(
-                "{}: the family is not a plain linear code, so its codes have no ranks",
+                "{}: the family is not a plain linear code, so its codes cannot be enumerated by index",
                 args.family
             )
         })?;

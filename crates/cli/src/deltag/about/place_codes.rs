@@ -23,7 +23,7 @@ pub fn about(family: &Family, result_format: ResultFormat) -> anyhow::Result<()>
         }));
     }
     say!("{}, fingerprint {}", family.name(), family.fingerprint());
-    say!("  position codes: any few adjacent upright tiles identify their position on the board");
+    say!("  position codes: any 3 × 4 adjacent upright tiles identify their position on the board");
     say!("  cells           {BITS} in a tile");
     say!("  boards          {BOARDS}, with ids from 0");
     say!("  positions       {PLACES} on each board, repeating after 256 edges");

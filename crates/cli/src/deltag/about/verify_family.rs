@@ -11,8 +11,8 @@ use deltille_core::words::counted;
 /// Text at the end of `--help`.
 pub const HELP: &str = "Checks the codes (distance, rules, fingerprint, statistics) and the construction. Algebraic \
     constructions, and lexicodes of up to 25 bits, are recomputed; the output names every claim that is not checked. \
-    Seeds and texts are not checked. Exit code 0 if all checks pass for every family, 1 if one fails, 2 if a file \
-    cannot be read as a family file.";
+    Seeds and free-text fields are not checked. Exit code 0 if all checks pass for every family, 1 if one fails, 2 \
+    if a file cannot be read as a family file.";
 
 #[derive(clap::Args)]
 pub struct Args {

@@ -28,8 +28,8 @@ pub struct Args {
 /// Selection of the best rule.
 #[derive(clap::Args)]
 pub struct ChoiceArgs {
-    /// Select the complexity rule that leaves the most codes at this natural false-positive rate per bordered
-    /// triangle, such as 1e-4, with --corrects cells corrected
+    /// Select the complexity rule that leaves the most codes at this natural false-positive rate per black-bordered
+    /// triangle in the image, such as 1e-4, with --corrects cells corrected
     #[arg(long, value_name = "RATE", allow_negative_numbers = true,
           value_parser = crate::values::number(1e-15..=1.0))]
     pub false_positives: Option<f64>,

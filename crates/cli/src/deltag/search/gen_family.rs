@@ -39,8 +39,8 @@ pub const HELP: &str = "Ctrl-C ends a search early. The methods best and algebra
     (130). A second Ctrl-C ends the program immediately.";
 
 /// Help text of `--force`.
-pub const FORCE: &str = "Also replace a family file with more codes, other bits or another distance, and files of \
-    other kinds";
+pub const FORCE: &str = "Also overwrite a family file that has more codes, another size or another distance, and \
+    existing files of any other type";
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -49,8 +49,8 @@ pub struct Args {
     /// Search method
     #[arg(long, value_enum, default_value_t = Method::Best)]
     method: Method,
-    /// Time limit in seconds; for best and algebraic, longer searches find larger families [default: 60]; search
-    /// starts no round after it
+    /// Time limit in seconds; for best and algebraic, longer searches find larger families [default: 60]; the method
+    /// `search` starts no new round after this time
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true,
           value_parser = number(0.001..=1e6))]
     time: Option<f64>,
@@ -102,7 +102,7 @@ pub struct Args {
 enum Method {
     /// Known and other codes, arranged and improved by local search within --time
     Best,
-    /// Algebraic codes, arranged within --time without local search
+    /// Algebraic codes; only the assignment of code positions to cells is optimised, within --time
     Algebraic,
     /// Local search from nothing, up to 25 bits; reproducible for the same seed and number of rounds
     Search,

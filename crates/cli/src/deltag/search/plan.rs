@@ -14,7 +14,7 @@ use deltille_core::words::counted;
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Number of faces of the target, or of boards
+    /// Number of faces, or of flat boards
     #[arg(long, default_value_t = 1, allow_negative_numbers = true,
           value_parser = whole(1..=u32::MAX))]
     faces: u32,
@@ -22,7 +22,7 @@ pub struct Args {
     #[arg(long, default_value_t = 10, allow_negative_numbers = true,
           value_parser = whole(1..=u32::MAX))]
     tags_per_face: u32,
-    /// Smallest number of misread cells to correct per tag
+    /// Minimum number of misread cells that must be correctable per tag
     #[arg(long, value_name = "CELLS", default_value_t = 0, allow_negative_numbers = true,
           value_parser = whole(0..=31u32))]
     corrects: u32,

@@ -14,16 +14,16 @@ pub struct RuleArgs {
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true,
           value_parser = crate::values::number(0.0..=1.0))]
     min_complexity: Option<f64>,
-    /// Smallest number of white cells in every code [default: the distance]
+    /// Minimum distance of every code from the all-black tile (its minimum number of white cells) [default: the
+    /// distance]
     #[arg(long, value_name = "CELLS", allow_negative_numbers = true,
           value_parser = crate::values::whole(0..=64u32))]
     black_distance: Option<u32>,
-    /// Also keep codes at the family's distance from the all-white tile
+    /// Require every code to differ from the all-white tile in at least h cells
     #[arg(long)]
     reject_white: bool,
-    /// Keep codes distinct when cells are hidden: apex (the 4 cells of any corner), edge (the cells along any edge)
-    /// or tile (any 4 cells in a triangle); they still differ in at least 3 cells, or as many as given (edge=5).
-    /// Repeatable
+    /// Minimum distance under erasures: apex (the 4 cells at any one corner), edge (the cells along any one edge) or
+    /// tile (any 4 cells in a triangle); 3, or as given (edge=5). Repeatable
     #[arg(long, value_name = "CELLS[=DISTANCE]")]
     robust_to: Vec<Robust>,
     /// Leave the centre cells unused, for a hole: one cell, or six with 9 and 36 bits

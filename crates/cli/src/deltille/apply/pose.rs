@@ -36,7 +36,7 @@ pub struct Args {
     /// Camera file of `deltille calibrate`, ROS or OpenCV
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
-    /// Use --target even if the camera was calibrated with a board of the same tags at another size
+    /// Use --target even if the camera was calibrated with a board with the same tags but a different size
     #[arg(long)]
     assume_target: bool,
     #[command(flatten)]

@@ -38,7 +38,7 @@ struct ViewArgs {
     /// Width and height of the output images in px, such as 1280x960 [default: those of the camera]
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
-    /// Distance at which images of a pupil-model lens are exact, such as 2m [default: infinity]
+    /// Object distance for which the mapping is exact (model pupil only), such as 2m [default: infinity]
     #[arg(long, value_name = "LENGTH", value_parser = distance)]
     distance: Option<f64>,
     /// Also write the remap tables for OpenCV's remap, as float32 arrays for NumPy

@@ -44,7 +44,7 @@ pub struct Args {
     /// Write the comparison, and a plot of each camera under the same name
     #[arg(short, long, value_name = "FILE.json")]
     output: Option<PathBuf>,
-    /// Compare even if the calibrations used boards of the same tags at different sizes
+    /// Compare even if the calibrations used boards with the same tags but different sizes
     #[arg(long)]
     assume_target: bool,
     #[command(flatten)]

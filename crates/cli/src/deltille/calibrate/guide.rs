@@ -52,7 +52,7 @@ pub struct Args {
     /// Camera model to calibrate: radtan, radtan5, rational, thin-prism, kannala-brandt …, as in `deltille calibrate`
     #[arg(long, default_value = "radtan", conflicts_with = "camera")]
     model: ModelChoice,
-    /// Approximate camera file to start from; all its parameters are calibrated again
+    /// Camera file with approximate parameters to start from; all are calibrated again
     #[arg(long, value_name = "FILE")]
     camera: Option<PathBuf>,
     /// Also estimate how the board is bent, and choose views for that
@@ -78,7 +78,7 @@ pub struct Args {
     /// photograph
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// Use --target even if the camera was calibrated with a board of the same tags at another size
+    /// Use --target even if the camera was calibrated with a board with the same tags but a different size
     #[arg(long)]
     assume_target: bool,
     #[command(flatten)]

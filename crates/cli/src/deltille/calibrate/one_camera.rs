@@ -37,8 +37,8 @@ pub struct Args {
     sightings: SightingsArgs,
     /// The camera model.
     #[arg(long, required_unless_present = "fixed_intrinsics", help = format!(
-        "Camera model to estimate with fx, fy, cx, cy: {}, which fixes fx, fy, cx, cy; auto selects the model with the lowest \
-         error on held-out views",
+        "Camera model: {}. All except spline also estimate fx, fy, cx, cy. auto: the simplest model whose held-out error \
+         is at most 5 % above the lowest",
         Model::choice()
     ))]
     model: Option<ModelChoice>,

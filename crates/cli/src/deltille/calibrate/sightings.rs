@@ -66,8 +66,8 @@ pub struct GridArgs {
 /// Known properties of the printed sheet.
 #[derive(clap::Args)]
 pub struct SheetArgs {
-    /// Scale of the print, measured over nominal length of the check bars: across and up the sheet, such as
-    /// 0.9973,0.9981, or one number for both
+    /// Ratio of measured to nominal length of the check bars, horizontal and vertical, such as 0.9973,0.9981,
+    /// or one number for both
     #[arg(long, value_name = "ACROSS,UP", value_parser = scale, allow_hyphen_values = true)]
     print_scale: Option<[f64; 2]>,
     /// Known bend and print scale of the sheet: the .json of `calibrate --board-shape`

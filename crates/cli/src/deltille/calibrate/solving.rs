@@ -46,7 +46,7 @@ pub struct SolveArgs {
     /// Also estimate the position of every target corner, and write a measured target
     #[arg(long, conflicts_with_all = ["shape", "board_shape"])]
     measure_target: bool,
-    /// Standard deviation of the board's corners from the description per axis, such as 0.05mm, or 0 for an exact
+    /// Standard uncertainty per axis of the corner positions in the description, such as 0.05mm, or 0 for an exact
     /// board; included in the observed standard deviations [default: that of a measured target, otherwise 0.1 mm, at
     /// most 0.5 % of an edge]
     #[arg(long, value_name = "LENGTH", value_parser = accuracy)]
@@ -98,7 +98,8 @@ impl FromStr for ModelChoice {
             "auto" => Ok(Self::Auto),
             _ => text.parse().map(Self::Model).map_err(|error: ModelError| {
                 format!(
-                    "{error}, or auto, which selects the model with the lowest error on held-out views"
+                    "{error}, or auto, which selects the simplest model whose held-out error is at most 5 % above \
+                     the lowest"
                 )
             }),
         }

@@ -194,8 +194,8 @@ impl File {
         let new = fs::read(staged.join(&self.name)).unwrap_or_default();
         match lost_board(&path, &new) {
             Some(board) => bail!(
-                "{} describes another board, {board}, and its prints need this file; keep both with another --name or \
-                 -o, or use --force to replace it",
+                "{} describes another board, {board}; without it, existing prints of that board cannot be used; \
+                 keep both with another --name or -o, or use --force to replace it",
                 path.display()
             ),
             None => Ok(()),

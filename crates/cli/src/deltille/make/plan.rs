@@ -42,7 +42,8 @@ pub struct Args {
     /// Tag family; checkerboards have no tags unless it is given [default: delTag25h7]
     #[arg(long)]
     family: Option<String>,
-    /// Propose a board of position codes, on which any few tiles identify their position
+    /// Propose a board of position codes, on which any 3 × 4 adjacent tiles identify their position and which of 255
+    /// boards it is
     #[arg(long, conflicts_with_all = ["family", "checker"])]
     dense: bool,
     /// Propose a board without tags

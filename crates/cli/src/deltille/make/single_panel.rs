@@ -47,7 +47,7 @@ pub struct PrintingArgs {
     /// Text for the label of every sheet, next to the name, such as the owner
     #[arg(long, value_name = "TEXT")]
     note: Option<String>,
-    /// SVG logo, printed in black opposite the label: filled paths and strokes; white is paper
+    /// SVG logo, printed in black opposite the label: filled paths and strokes; white areas stay unprinted
     #[arg(long, value_name = "FILE")]
     logo: Option<PathBuf>,
     /// Height of the logo [default: the height of the label strip]

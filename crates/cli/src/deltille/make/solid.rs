@@ -56,8 +56,8 @@ pub mod squares {
                              (squares have the same size on all faces) [default: 8]";
     pub const FAMILY: &str = "Tag family: aprilTag36h11, aprilTag25h9 or aprilTag16h5, or a family file \
                               [default: aprilTag36h11]";
-    pub const SPACING: &str = "Put a tag in every N-th row and column of a face where the square is black, which with \
-                               odd N is every second one [default: 2]";
+    pub const SPACING: &str = "Put a tag in every N-th row and column of a face, only where that square is black \
+                               (for odd N, every second position) [default: 2]";
     pub const BORDER: &str = "Width of a tag's black border in cells, at least 1 [default: 2]";
 }
 

@@ -43,8 +43,8 @@ enum Experiment {
     /// The paper's §4.4: a rig of four cameras, calibrated with an icosahedron and with a cube with misplaced panels,
     /// with and without refining them: rig.csv
     Rig(RigArgs),
-    /// How often changes are diagnosed: views of a camera in one state, of a camera that changes, with a rolling
-    /// shutter, and with a board of other proportions: states.csv
+    /// Detection and false-alarm rates of camera changes: unchanged camera, changed camera, rolling shutter, wrong
+    /// aspect ratio of the board: states.csv
     States(StatesArgs),
     /// The paper's Table 2: calibrate on the first half of a sequence of photographs, and estimate poses on the
     /// second

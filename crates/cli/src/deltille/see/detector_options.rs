@@ -23,8 +23,8 @@ pub struct FinderArgs {
     /// Detect untagged boards of this tiling instead
     #[arg(long, value_name = "KIND")]
     grid: Option<Kind>,
-    /// Number of corner rows of the untagged board; labels fully visible boards from their lower left corner, on a
-    /// checkerboard from the corner with the dark square
+    /// Number of corner rows of the untagged board. With --cols, a fully visible board is labelled: corner (0, 0) is at
+    /// the lower left; on a checkerboard, at a dark corner square (the lower one if there are two)
     #[arg(long, conflicts_with = "target", requires = "cols", value_parser = whole(SIDES))]
     rows: Option<u32>,
     /// Number of corners per row of the untagged board

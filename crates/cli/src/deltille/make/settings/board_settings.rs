@@ -56,11 +56,11 @@ pub struct BoardSettings {
     #[serde(alias = "tags")]
     family: Option<String>,
     /// Squares of a checkerboard that contain the tags: black (the square itself is the border) or white (each tag
-    /// has its own border, for detectors of single tags) [default: black]
+    /// has its own border, for detectors that need complete tags, such as AprilTag's) [default: black]
     #[arg(long, help_heading = TAGS, value_name = "COLOUR", value_parser = colour)]
     tags_in: Option<TagsIn>,
-    /// Put a small position code in every upright tile: any few adjacent tiles identify their position on a deltille
-    /// board, and which of 255 boards it is
+    /// Put a small position code in every upright tile of a deltille board: any 3 × 4 adjacent tiles identify their
+    /// position and which of 255 boards it is
     #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tag_spacing", "first_id", "untagged"])]
     #[serde(skip_serializing_if = "is_false")]
     dense: bool,
@@ -68,8 +68,8 @@ pub struct BoardSettings {
     #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tags_in", "tag_spacing", "tag_border", "hole", "first_id"])]
     #[serde(skip_serializing_if = "is_false")]
     untagged: bool,
-    /// Put a tag in every N-th row and column; on a checkerboard where the square has the right colour, which with
-    /// odd N is every second one [default: 3; 2 on a checkerboard]
+    /// Put a tag in every N-th row and column; on a checkerboard, only where that square has the tag colour (for odd N,
+    /// every second position) [default: 3; 2 on a checkerboard]
     #[arg(long, help_heading = TAGS, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
     tag_spacing: Option<u32>,
     /// Width of a tag's black border in cells, 0.6 to 10, at least 1 on a checkerboard [default: 1.5; 2 in black
@@ -150,7 +150,7 @@ pub struct BoardSettings {
     /// Text for the label of every sheet, next to the name, such as the owner
     #[arg(long, value_name = "TEXT")]
     note: Option<String>,
-    /// SVG logo, printed in black opposite the label: filled paths and strokes; white is paper
+    /// SVG logo, printed in black opposite the label: filled paths and strokes; white areas stay unprinted
     #[arg(long, value_name = "FILE")]
     logo: Option<String>,
     /// Height of the logo [default: the height of the label strip]

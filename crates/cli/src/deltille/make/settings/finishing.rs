@@ -27,8 +27,8 @@ pub struct Finishing {
     /// everything else overprinted
     #[arg(long, value_name = "NAME")]
     white: Option<String>,
-    /// Draw a cut line in the middle of the margin, in the PDF in a spot colour of this name, such as CutContour;
-    /// with --pack, between boards
+    /// Cut line along the middle of the margin, or between boards that share a sheet; in the PDF, in the spot colour
+    /// <NAME>, such as CutContour
     #[arg(long, value_name = "NAME")]
     contour: Option<String>,
 }

@@ -58,16 +58,16 @@ pub struct Meshes {
     #[serde(skip_serializing_if = "is_false")]
     usd: bool,
     /// Write <name>.3mf for printing in two colours: the white plate or solid, and a second body for the black areas,
-    /// inlaid into it (millimetres); with --skeleton, also that frame
+    /// inlaid into it (millimetres); for a solid with a skeleton, also the frame
     #[arg(long = "3mf")]
     #[serde(rename = "3mf", skip_serializing_if = "is_false")]
     threemf: bool,
-    /// Depth of the black inlay in a 3MF; less than the plate's thickness, or than the distance to where faces meet
-    /// [default: 0.4mm]
+    /// Depth of the black inlay in a 3MF; less than the plate thickness or, in a solid, than the depth at which inlays
+    /// of adjacent faces would meet [default: 0.4mm]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     inlay: Option<String>,
-    /// Longest side of the texture in px; a cell of a tag needs at least 4 px, of a checkerboard tag 12 [default: 20
-    /// px per cell, limited to 16384 px]
+    /// Longest side of the texture in px; at least 4 px per tag cell, 12 px on checkerboards [default: 20 px per
+    /// cell, limited to 16384 px]
     #[arg(long, value_name = "PX", allow_negative_numbers = true, value_parser = whole(SIDE_PX))]
     texture: Option<u32>,
     /// Distribute the faces over N textures, each of the size given by --texture, for more detail; without --texture,

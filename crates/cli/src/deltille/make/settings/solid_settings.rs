@@ -59,7 +59,8 @@ pub struct SolidSettings {
     /// Tag family: a name from `deltag list`, or a family file [default: delTag25h7]
     #[arg(long, help_heading = TAGS)]
     pub family: Option<String>,
-    /// Put a small position code in every upright tile: any few adjacent tiles identify their position
+    /// Put a small position code in every upright tile: any 3 × 4 adjacent tiles identify their position and which of
+    /// 255 boards it is, one per face
     #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tag_spacing", "first_id"])]
     #[serde(skip_serializing_if = "is_false")]
     pub dense: bool,
@@ -68,7 +69,7 @@ pub struct SolidSettings {
           conflicts_with_all = ["family", "dense", "tag_spacing", "tag_border", "hole", "first_id", "tag_ids"])]
     #[serde(skip_serializing_if = "is_false")]
     pub untagged: bool,
-    /// Exchange black and white: white tiles on black, in part of the margin [default margin: 8mm]
+    /// Exchange black and white: white tiles on a black field that extends into the margin [default margin: 8mm]
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     pub invert: bool,
@@ -130,8 +131,7 @@ pub struct SolidSettings {
     #[arg(long, help_heading = PAPER)]
     #[serde(skip_serializing_if = "is_false")]
     pub per_face: bool,
-    /// Print a net larger than the paper in one piece, on pages joined along seams through its tiles, instead of in
-    /// pieces of whole faces
+    /// Split a large net across pages with seams through tiles, instead of between faces
     #[arg(long, help_heading = PAPER, conflicts_with = "per_face")]
     #[serde(skip_serializing_if = "is_false")]
     pub allow_seams: bool,
@@ -165,7 +165,7 @@ pub struct SolidSettings {
     /// Text for the label of every sheet, next to the name, such as the owner
     #[arg(long, value_name = "TEXT")]
     pub note: Option<String>,
-    /// SVG logo, printed in black opposite the label: filled paths and strokes; white is paper
+    /// SVG logo, printed in black opposite the label: filled paths and strokes; white areas stay unprinted
     #[arg(long, value_name = "FILE")]
     pub logo: Option<String>,
     /// Height of the logo [default: the height of the label strip]
