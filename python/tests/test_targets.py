@@ -66,7 +66,7 @@ def test_a_target_is_read_back(tmp_path, board):
 def test_the_description_of_another_board_is_kept(tmp_path, board):
     board.save(tmp_path)
     larger = deltille.Board(7, 8, edge_mm=25, name="desk")
-    with pytest.raises(deltille.FileError, match=r"edges of 20 mm\); without it, .* or `overwrite` it"):
+    with pytest.raises(deltille.FileError, match=r"edges of 20 mm\); without it, .* or set `overwrite`"):
         larger.save(tmp_path)
     assert deltille.Target.load(tmp_path / "desk.json") == board
     larger.save(tmp_path, overwrite=True)
