@@ -6,7 +6,7 @@
 //! 1. `reweighting` estimates weights and unknowns alternately, and excludes single outlier corners.
 //! 2. `lack_of_fit` finds patterns in residuals, `view_consistency` frames that contradict the camera of all others.
 //! 3. `wrong_views` uses these to exclude panels, views, and panels in views; `finding` records what the excluded have
-//! in common.
+//!    in common.
 //! 4. `added_unknowns` continues with more unknowns: smoothness of a spline, shape of the board, offsets of corners.
 
 pub(crate) mod added_unknowns;

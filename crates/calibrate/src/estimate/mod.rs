@@ -4,7 +4,7 @@
 //!
 //! 1. `values` are cameras, targets, frames, views and corners with residuals.
 //! 2. `target_map` (measured corners), `coverage` (where corners were seen), `lens_end` and `image_circle` (extent of
-//! the lens) are parts of it.
+//!    the lens) are parts of it.
 //! 3. `uncertainty_map` is the projection uncertainty of a camera over its image.
 //! 4. `assemble` builds the estimate.
 

@@ -3,9 +3,9 @@
 //! Input: blocks of observations, and values of the unknowns. Output: residuals, and their whitening.
 //!
 //! 1. `unknowns` of cameras, targets and panels, and the observations of a block; `panels` chooses the fixed panel and
-//! target.
+//!    target.
 //! 2. `shape` (of a sheet), `corner_map` (offsets of corners) and `roughness` (knots of a spline) are unknowns with
-//! priors.
+//!    priors.
 //! 3. `bundle` combines them: points, residuals, and parts of the problem.
 //! 4. `whitening` weights residuals by covariances and one common variance.
 //! 5. `corner_gauge` removes from the offsets the directions that poses absorb.

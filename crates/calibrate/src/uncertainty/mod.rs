@@ -3,9 +3,9 @@
 //! Input: a minimum with its covariances from noise. Output: covariances that include errors of model and board.
 //!
 //! 1. `agreement` computes the covariance from the scatter between frames, `board_errors` the part from errors of the
-//! board.
+//!    board.
 //! 2. `state_equations` forms equations of each view for changes of the camera, a rolling shutter and a stretched
-//! board.
+//!    board.
 //! 3. `halves` raises the covariance if halves of the views differ by more.
 //! 4. `projection` is the uncertainty of projections; `known_so_far` the information from which views are proposed.
 
