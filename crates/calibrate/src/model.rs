@@ -46,7 +46,7 @@ pub enum Model {
     DoubleSphere,
     /// Equidistant polynomial with a moving entrance pupil.
     Pupil,
-    /// Stereographic projection with a spline correction, see [`Spline`]. fx, fy, cx, cy are fixed at those of the
+    /// Stereographic projection with a spline correction, see [`deltille_core::camera::Spline`]. fx, fy, cx, cy are fixed at those of the
     /// parametric lens from which the search starts.
     Spline {
         /// Degree of the polynomials, 2 or 3.

@@ -158,7 +158,7 @@ impl Camera {
     /// use glam::{DVec2, DVec3};
     ///
     /// let camera = Camera::pinhole(640, 480, std::f64::consts::FRAC_PI_2);
-    /// Half of a field of view of 90° to the right is the middle of the right image edge.
+    /// // Half of a field of view of 90° to the right is the middle of the right image edge.
     /// let pixel = camera.project(DVec3::new(200.0, 0.0, 200.0)).unwrap();
     /// assert!(pixel.abs_diff_eq(DVec2::new(639.5, 239.5), 1e-9));
     /// let ray = camera.unproject(pixel).unwrap();

@@ -9,7 +9,7 @@ use super::{AnyGray, Gray, Intensity, View};
 /// ```
 /// use deltille_core::raster::{ImageView, View};
 ///
-/// The left half of an image of 640 × 480 pixels, without a copy.
+/// // The left half of an image of 640 × 480 pixels, without a copy.
 /// let pixels = vec![0u8; 640 * 480];
 /// let half = ImageView::from(View::new(320, 480, 640, &pixels).expect("enough pixels"));
 /// assert_eq!((half.width(), half.height()), (320, 480));

@@ -10,7 +10,7 @@ use crate::family::{Family, PAIRS_COUNTED};
 ///
 /// let [a, b] = ["d16h5", "delTag16h5"].map(|name| Family::shipped(name).unwrap());
 /// let confusion = Confusion::between(&a, &b).unwrap();
-/// Each of the 34 tags of one family is compared with all words of the other.
+/// // Each of the 34 tags of one family is compared with all words of the other.
 /// assert_eq!(confusion.direct.values().sum::<u64>(), 34 * 3 * 78);
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]

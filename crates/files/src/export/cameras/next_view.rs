@@ -132,7 +132,7 @@ pub fn svg(next: &NextView, enough: bool) -> String {
     text + "</svg>\n"
 }
 
-/// Like [`svg`], but as a PNG over the last photograph. The background is black if there is none or if its size differs. If the
+/// Like [`svg()`], but as a PNG over the last photograph. The background is black if there is none or if its size differs. If the
 /// views are enough, the PNG shows only the photograph.
 ///
 /// # Errors

@@ -116,7 +116,7 @@ impl Decoder {
     ///
     /// let family = Family::shipped("d25h9")?;
     /// let decoder = Decoder::new(&family);
-    /// A finger covers an edge, which reads as white, and one more cell is misread.
+    /// // A finger covers an edge, which reads as white, and one more cell is misread.
     /// let edge = HiddenCells::Edge.masks(family.dimension())[0];
     /// let read = (family.code(12).unwrap() | edge) ^ 1 << 24;
     /// let decoded = decoder.decode_erased(read, edge, 1).unwrap();
