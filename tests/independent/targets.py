@@ -92,5 +92,5 @@ for view in range(3):
 assert worst < 0.3, worst
 assert missing == 0, missing
 alike = run("detect", path, "--target", folder / "front.json", "--target", folder / "front.json")
-assert alike.returncode == 2 and "named front" in alike.stderr, alike.stderr
+assert alike.returncode == 2 and "have the name front" in alike.stderr, alike.stderr
 print(f"{len(BOARDS)} targets at once, {len(apart)} corners a picture: as each by itself, {worst:.3f} px from the pages")
