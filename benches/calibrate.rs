@@ -5,7 +5,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use deltille::calibrate::{
-    Calibration, CameraViews, Model, Observation, PanelPlace, PanelRef, Sighting, View,
+    Calibration, CameraViews, Model, Observation, PanelPrior, PanelRef, Sighting, View,
 };
 use deltille::camera::{BrownConrady, Camera, Lens, Pose};
 use glam::{DQuat, DVec3};
@@ -69,7 +69,7 @@ fn board() -> (Vec<View>, Vec<Pose>) {
 
 /// Returns the views of four cameras in 150 frames, and a solid of twenty triangular faces with 36 corners each. Each
 /// camera sees eight faces.
-fn rig() -> (Vec<CameraViews>, Vec<PanelPlace>) {
+fn rig() -> (Vec<CameraViews>, Vec<PanelPrior>) {
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let corners = (0..8).flat_map(|row| (0..8 - row).map(move |col| (row, col)));
     let corners = corners.map(|(row, col)| {

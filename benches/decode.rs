@@ -19,7 +19,7 @@ fn decode(criterion: &mut Criterion) {
         let misread: Vec<u64> = (0..1024)
             .map(|_| {
                 let code = family.codes()[random.random_range(0..family.len())];
-                let word = words.turns(code)[random.random_range(0..3)];
+                let word = words.rotations(code)[random.random_range(0..3)];
                 (0..family.correctable()).fold(word, |w, _| w ^ 1 << random.random_range(0..bits))
             })
             .collect();
@@ -45,9 +45,9 @@ fn decode(criterion: &mut Criterion) {
             let mut next = reads.iter().cycle();
             group.bench_function(format!("{kind}, brute force"), |bencher| {
                 bencher.iter(|| {
-                    let turns = words.turns(*next.next().expect("endless"));
+                    let rotations = words.rotations(*next.next().expect("endless"));
                     let distance =
-                        |code: &u64| turns.iter().map(|turn| (turn ^ code).count_ones()).min();
+                        |code: &u64| rotations.iter().map(|turn| (turn ^ code).count_ones()).min();
                     black_box(family.codes().iter().enumerate().min_by_key(|(_, c)| distance(c)))
                 });
             });

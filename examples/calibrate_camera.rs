@@ -6,7 +6,7 @@
 
 use std::error::Error;
 
-use deltille::calibrate::{Calibration, Model, Reference, Words, views};
+use deltille::calibrate::{Calibration, Messages, Model, Reference, views};
 use deltille::detect::Detector;
 use deltille::photograph;
 use deltille::report::Report;
@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     if let Some(held_out) = &estimate.held_out {
         println!("rms {:.4} px in {} views held out", held_out.rms_px, held_out.frames.len());
     }
-    let words = Words::new(&estimate, None);
+    let words = Messages::new(&estimate, None);
     for diagnosis in &diagnoses {
         println!("warning: {}", words.sentence(diagnosis));
     }

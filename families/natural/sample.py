@@ -21,7 +21,7 @@ import tags
 # Edges of the triangles, px.
 EDGES_PX = (24, 240)
 # Least contrast at an edge, of full scale: 10 grey levels of 256.
-LEAST_CONTRAST = 0.04
+MIN_CONTRAST = 0.04
 # Places along an edge, as in `detect::grid_light`, and how far from it black and white are looked for, in bit-widths.
 ALONG = (0.38, 0.5, 0.62)
 DEPTH_BITS = 0.75
@@ -111,7 +111,7 @@ def candidates(image, rng, rows):
     for points in edges_of(rows).astype(np.float32):
         x, y = in_picture(origin, axes, points.reshape(-1, 2))
         seen = bilinear(image, x, y).reshape(-1, 2, len(ALONG)).mean(-1)
-        bordered = seen[:, 1] - seen[:, 0] > LEAST_CONTRAST
+        bordered = seen[:, 1] - seen[:, 0] > MIN_CONTRAST
         levels = np.concatenate([levels, seen[:, None]], 1)[bordered]
         origin, axes = origin[bordered], axes[bordered]
     return origin, axes, levels, whole.sum()

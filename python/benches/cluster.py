@@ -31,7 +31,7 @@ from PIL import Image
 
 import deltille
 import deltille.ray
-from deltille.ray import CORNERS, PICTURES, _Rows
+from deltille.ray import CORNERS, IMAGES, _Rows
 
 SIZE = (480, 360)
 VIEWS = 300
@@ -83,7 +83,7 @@ def in_order(table: pa.Table) -> pa.Table:
 
 
 def written(folder: Path) -> tuple[pa.Table, pa.Table]:
-    return pq.read_table(folder / "corners", schema=CORNERS), pq.read_table(folder / "pictures", schema=PICTURES)
+    return pq.read_table(folder / "corners", schema=CORNERS), pq.read_table(folder / "images", schema=IMAGES)
 
 
 class Watch(threading.Thread):
@@ -109,7 +109,7 @@ class Watch(threading.Thread):
                 except psutil.NoSuchProcess:
                     continue
             if self.kill_when is not None and self.killed is None:
-                written = [pq.read_metadata(path).num_rows for path in (self.folder / "pictures").glob("*.parquet")]
+                written = [pq.read_metadata(path).num_rows for path in (self.folder / "images").glob("*.parquet")]
                 if sum(written) >= self.kill_when * self.count:
                     victim = workers()[0]
                     self.killed = victim.pid
@@ -188,7 +188,7 @@ def main() -> None:
 
     failed = []
     for name in ("one", "two", "killed"):
-        for what, expected, found in zip(("corners", "pictures"), alone, written(folder / name)):
+        for what, expected, found in zip(("corners", "images"), alone, written(folder / name)):
             same = in_order(expected).equals(in_order(found))
             failed += [] if same else [f"{name}: {what}"]
             print(f"{name}: {what}: {len(found)} rows, {'the same' if same else 'NOT the same'} as from one process")

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     Paths: TypeAlias = Union[str, "os.PathLike[str]", Sequence[Union[str, "os.PathLike[str]"]]]
     Targets: TypeAlias = Union["deltille.Target", Sequence["deltille.Target"]]
 
-__all__ = ["CORNERS", "PICTURES", "Summary", "detect", "detect_to", "done"]
+__all__ = ["CORNERS", "IMAGES", "Summary", "detect", "detect_to", "done"]
 
 #: Metadata key of a table: a hash of the target and the options of its images.
 ASKED = b"deltille.asked"
@@ -61,7 +61,7 @@ CORNERS = pa.schema(
 )
 
 #: Columns of the table of images.
-PICTURES = pa.schema(
+IMAGES = pa.schema(
     [
         ("image", pa.string()),
         ("width", pa.int32()),
@@ -75,26 +75,26 @@ PICTURES = pa.schema(
         ("tone_black", pa.float64()),
         ("tone_white", pa.float64()),
         ("tone_kappa", pa.float64()),
-        ("tone_kappa_deviation", pa.float64()),
+        ("tone_kappa_sd", pa.float64()),
         ("tone_kappa_odd", pa.float64()),
         ("tone_used", pa.bool_()),
         ("ink_edges", pa.float64()),
-        ("ink_edges_deviation", pa.float64()),
+        ("ink_edges_sd", pa.float64()),
         ("ink_um", pa.float64()),
-        ("ink_um_deviation", pa.float64()),
+        ("ink_um_sd", pa.float64()),
         ("ink_used", pa.bool_()),
-        ("ink_pictures", pa.int32()),
+        ("ink_images", pa.int32()),
         ("exif_orientation", pa.int32()),
         ("damage", pa.string()),
         ("error", pa.string()),
         ("targets", pa.string()),
     ],
-    metadata={"deltille.schema": "deltille/pictures/1"},
+    metadata={"deltille.schema": "deltille/images/1"},
 )
 
 # Columns of a corner nested in the row of its image: all except the name of the image.
 _CORNER = pa.struct(list(CORNERS)[1:])
-_BOTH = pa.schema([*PICTURES, pa.field("found", pa.list_(_CORNER))])
+_BOTH = pa.schema([*IMAGES, pa.field("found", pa.list_(_CORNER))])
 
 _ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".pnm", ".pbm", ".webp")
 
@@ -104,27 +104,27 @@ class Summary:
 
     Attributes
     ----------
-    pictures, corners, errors : int
+    images, corners, errors : int
         Number of images processed, of corners found in them, and of images that could not be read.
     skipped : int
         Number of images that already had results. Images of a dataset are not counted, as its length is not known.
     """
 
-    def __init__(self, pictures: int, corners: int, errors: int, skipped: int) -> None:
-        self.pictures = pictures
+    def __init__(self, images: int, corners: int, errors: int, skipped: int) -> None:
+        self.images = images
         self.corners = corners
         self.errors = errors
         self.skipped = skipped
 
     def __repr__(self) -> str:
         return (
-            f"<Summary: {self.pictures} pictures, {self.corners} corners, {self.errors} errors, "
+            f"<Summary: {self.images} images, {self.corners} corners, {self.errors} errors, "
             f"{self.skipped} skipped>"
         )
 
 
 def detect(
-    pictures: Union["ray.data.Dataset", Paths],
+    images: Union["ray.data.Dataset", Paths],
     target: Optional[Targets] = None,
     *,
     per: str = "corner",
@@ -138,15 +138,15 @@ def detect(
 
     Parameters
     ----------
-    pictures : str, path-like, sequence of these, or ray.data.Dataset
+    images : str, path-like, sequence of these, or ray.data.Dataset
         Photographs and folders of them, on any filesystem that Ray supports (``"s3://bucket/day"``) and every worker can
         access. Or a dataset with a column ``path``, and optionally ``bytes`` (encoded files, as from
         :func:`ray.data.read_binary_files` with ``include_paths=True``).
     target : Target or sequence of Target, optional
         The target to find.
     per : str, optional
-        ``"corner"``: one row per corner, with the columns :data:`CORNERS`. ``"picture"``: one row per image, with the
-        columns :data:`PICTURES`; images that could not be read have a message in ``error``. ``"both"``: one row per image
+        ``"corner"``: one row per corner, with the columns :data:`CORNERS`. ``"image"``: one row per image, with the
+        columns :data:`IMAGES`; images that could not be read have a message in ``error``. ``"both"``: one row per image
         with an additional column ``found``, the list of its corners.
     concurrency : int or (int, int), optional
         Number of detecting processes, or its minimum and maximum. Defaults to the number of processors of the cluster, or
@@ -173,26 +173,26 @@ def detect(
     deltille.Error
         If neither a target nor a grid is given.
     """
-    if per not in ("corner", "picture", "both"):
-        raise ValueError(f'unknown per {per} (known: "corner", "picture", "both")')
+    if per not in ("corner", "image", "both"):
+        raise ValueError(f'unknown per {per} (known: "corner", "image", "both")')
     found: ray.data.Dataset
-    found, _ = _detect(pictures, frozenset(), target, per, concurrency, batch_size, filesystem, accept_damaged, options)
+    found, _ = _detect(images, frozenset(), target, per, concurrency, batch_size, filesystem, accept_damaged, options)
     return found
 
 
 def detect_to(
     folder: Union[str, "os.PathLike[str]"],
-    pictures: Union["ray.data.Dataset", Paths],
+    images: Union["ray.data.Dataset", Paths],
     target: Optional[Targets] = None,
     *,
     concurrency: Union[int, tuple[int, int], None] = None,
     batch_size: int = 64,
     filesystem: Any = None,
     accept_damaged: bool = False,
-    pictures_per_file: int = 1000,
+    images_per_file: int = 1000,
     **options: Any,
 ) -> Summary:
-    """Detects a target in images and writes results continuously to ``folder/corners`` and ``folder/pictures``.
+    """Detects a target in images and writes results continuously to ``folder/corners`` and ``folder/images``.
 
     Images that already have results in the folder are skipped, even if they have no corners or an error: repeat the same call
     to resume an interrupted run. ``deltille calibrate FOLDER --target …`` reads the folder.
@@ -201,9 +201,9 @@ def detect_to(
     ----------
     folder : str or path-like
         A folder or bucket that every worker can access; created if necessary.
-    pictures, target, concurrency, batch_size, filesystem, accept_damaged, **options
+    images, target, concurrency, batch_size, filesystem, accept_damaged, **options
         See :func:`detect`; `filesystem` is that of the images.
-    pictures_per_file : int, optional
+    images_per_file : int, optional
         Minimum number of images per file of either table. An interrupted run loses images that are not in a file yet.
 
     Returns
@@ -215,11 +215,11 @@ def detect_to(
     deltille.DetectionError
         If the folder contains results for another target or other options.
     """
-    if pictures_per_file < 1:
-        raise ValueError("pictures_per_file must be at least 1")
+    if images_per_file < 1:
+        raise ValueError("images_per_file must be at least 1")
     to, root = _place(folder)
     asked = _asked(target, {**options, "accept_damaged": accept_damaged})
-    for path in _files(to, f"{root}/pictures")[:1]:
+    for path in _files(to, f"{root}/images")[:1]:
         with to.open_input_file(path) as file:
             known = (pq.read_schema(file).metadata or {}).get(ASKED, asked)
         if known != asked:
@@ -228,7 +228,7 @@ def detect_to(
     _remove_halves(to, root)
     there = done(folder)
     dataset, skipped = _detect(
-        pictures, there, target, "both", concurrency, batch_size, filesystem, accept_damaged, options
+        images, there, target, "both", concurrency, batch_size, filesystem, accept_damaged, options
     )
     if dataset is None:
         return Summary(0, 0, 0, skipped)
@@ -236,22 +236,22 @@ def detect_to(
     # them all, and would wait forever for the writer.
     written = dataset.map_batches(
         _Writing,
-        batch_size=pictures_per_file,
+        batch_size=images_per_file,
         batch_format="pyarrow",
         compute=ray.data.ActorPoolStrategy(size=1),
         num_cpus=0,
         fn_constructor_kwargs={"filesystem": to, "root": root, "run": uuid.uuid4().hex[:12], "asked": asked},
     )
-    counts = [[row["pictures"], row["corners"], row["errors"]] for row in written.iter_rows()]
-    pictures_seen, corners, errors = (sum(column) for column in zip(*counts)) if counts else (0, 0, 0)
-    return Summary(pictures_seen, corners, errors, skipped)
+    counts = [[row["images"], row["corners"], row["errors"]] for row in written.iter_rows()]
+    images_seen, corners, errors = (sum(column) for column in zip(*counts)) if counts else (0, 0, 0)
+    return Summary(images_seen, corners, errors, skipped)
 
 
 def done(folder: Union[str, "os.PathLike[str]"]) -> frozenset[str]:
     """Returns the names of the images with results in a folder of :func:`detect_to`."""
     to, root = _place(folder)
     names: set[str] = set()
-    for path in _files(to, f"{root}/pictures"):
+    for path in _files(to, f"{root}/images"):
         with to.open_input_file(path) as file:
             names.update(pq.read_table(file, columns=["image"])["image"].to_pylist())
     return frozenset(names)
@@ -285,14 +285,14 @@ def _files(filesystem: pafs.FileSystem, folder: str) -> list[str]:
 def _remove_halves(filesystem: pafs.FileSystem, root: str) -> None:
     """Removes files of corners without a matching file of images."""
     name = os.path.basename
-    whole = {name(path) for path in _files(filesystem, f"{root}/pictures")}
+    whole = {name(path) for path in _files(filesystem, f"{root}/images")}
     for path in _files(filesystem, f"{root}/corners"):
         if name(path) not in whole:
             filesystem.delete_file(path)
 
 
 def _detect(
-    pictures: Any,
+    images: Any,
     there: frozenset[str],
     target: Optional[Targets],
     per: str,
@@ -310,13 +310,13 @@ def _detect(
     skipped = 0
     if filesystem is not None and not isinstance(filesystem, pafs.FileSystem):
         filesystem = pafs.PyFileSystem(pafs.FSSpecHandler(filesystem))
-    if isinstance(pictures, ray.data.Dataset):
-        names = set(pictures.schema().names)
+    if isinstance(images, ray.data.Dataset):
+        names = set(images.schema().names)
         if "path" not in names:
-            raise ValueError("pictures: the dataset has no column path with the names of the images")
-        dataset = pictures
+            raise ValueError("images: the dataset has no column path with the names of the images")
+        dataset = images
     else:
-        paths = _listed(pictures, filesystem)
+        paths = _listed(images, filesystem)
         left = [path for path in paths if path not in there]
         skipped = len(paths) - len(left)
         if not left and per == "both":
@@ -328,7 +328,7 @@ def _detect(
         resources: Callable[[], dict[str, float]] = ray.cluster_resources
         processors = max(1, int(resources().get("CPU", 1)))
         # The stages that make a dataset need a processor, too, and would wait for it forever.
-        concurrency = processors if pictures is not dataset else (1, max(1, processors - 1))
+        concurrency = processors if images is not dataset else (1, max(1, processors - 1))
     least, most = concurrency if isinstance(concurrency, tuple) else (concurrency, concurrency)
     found = dataset.map_batches(
         _Looking,
@@ -418,12 +418,12 @@ class _Rows:
     """Rows of both tables, column by column."""
 
     def __init__(self) -> None:
-        self.pictures: list[dict[str, Any]] = []
+        self.images: list[dict[str, Any]] = []
         self.counts: list[int] = []
         self.corners: list[pa.Table] = []
 
     def failed(self, image: str, error: str) -> None:
-        self.pictures.append({"image": image, "error": error})
+        self.images.append({"image": image, "error": error})
         self.counts.append(0)
 
     def add(self, image: str, found: "deltille.Detection") -> None:
@@ -451,9 +451,9 @@ class _Rows:
             picture["reasons"] = json.dumps(reasons)
         for name, estimate in (("tone", found.tone), ("ink", found.ink)):
             if estimate is not None:
-                fields = (field for field in PICTURES.names if field.startswith(f"{name}_"))
+                fields = (field for field in IMAGES.names if field.startswith(f"{name}_"))
                 picture |= {field: _field(estimate, field.removeprefix(f"{name}_")) for field in fields}
-        self.pictures.append(picture)
+        self.images.append(picture)
         self.counts.append(len(found))
         if len(found):
             self.corners.append(_corners(image, found))
@@ -462,9 +462,9 @@ class _Rows:
         corners = pa.concat_tables([CORNERS.empty_table(), *self.corners])
         if per == "corner":
             return corners
-        pictures = pa.Table.from_pylist(self.pictures, PICTURES)
-        if per == "picture":
-            return pictures
+        images = pa.Table.from_pylist(self.images, IMAGES)
+        if per == "image":
+            return images
         parts = corners.drop_columns(["image"]).combine_chunks()
         arrays = [parts[name].combine_chunks() for name in parts.column_names]
         values = pa.StructArray.from_arrays(arrays, fields=list(_CORNER))
@@ -472,7 +472,7 @@ class _Rows:
         for count in self.counts:
             ends.append(ends[-1] + count)
         found = pa.ListArray.from_arrays(pa.array(ends, pa.int32()), values)
-        return pa.table([*pictures.columns, found], schema=_BOTH)
+        return pa.table([*images.columns, found], schema=_BOTH)
 
 
 def _field(record: Any, name: str) -> Any:
@@ -534,27 +534,27 @@ class _Writing:
         self.root = root
         self.run = run
         self.asked = asked
-        for table in ("corners", "pictures"):
+        for table in ("corners", "images"):
             self.filesystem.create_dir(f"{root}/{table}", recursive=True)
 
     def __call__(self, both: pa.Table) -> pa.Table:
         if not len(both):
-            return pa.table({"pictures": [0], "corners": [0], "errors": [0]})
+            return pa.table({"images": [0], "corners": [0], "errors": [0]})
         both = both.combine_chunks()
-        pictures = both.select(PICTURES.names).cast(PICTURES)
-        pictures = pictures.replace_schema_metadata({**(PICTURES.metadata or {}), ASKED: self.asked})
+        images = both.select(IMAGES.names).cast(IMAGES)
+        images = images.replace_schema_metadata({**(IMAGES.metadata or {}), ASKED: self.asked})
         lists = both["found"].combine_chunks()
         values = lists.flatten()
-        image = pictures["image"].combine_chunks().take(pa.compute.list_parent_indices(lists))
+        image = images["image"].combine_chunks().take(pa.compute.list_parent_indices(lists))
         columns = [image, *(values.field(field.name) for field in list(CORNERS)[1:])]
         corners = pa.table(columns, schema=CORNERS)
         # Work repeated after a lost process writes the same files again.
-        of_these = hashlib.sha256("\n".join(pictures["image"].to_pylist()).encode()).hexdigest()
+        of_these = hashlib.sha256("\n".join(images["image"].to_pylist()).encode()).hexdigest()
         name = f"{self.run}-{of_these[:16]}.parquet"
         self._put(corners, f"{self.root}/corners", name)
-        self._put(pictures, f"{self.root}/pictures", name)
-        errors = len(pictures) - pictures["error"].null_count
-        return pa.table({"pictures": [len(pictures)], "corners": [len(corners)], "errors": [errors]})
+        self._put(images, f"{self.root}/images", name)
+        errors = len(images) - images["error"].null_count
+        return pa.table({"images": [len(images)], "corners": [len(corners)], "errors": [errors]})
 
     def _put(self, table: pa.Table, folder: str, name: str) -> None:
         """Writes a file atomically."""

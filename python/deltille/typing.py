@@ -78,7 +78,7 @@ class Candidate(TypedDict):
     parameters: int
     held_out_px: Optional[float]
     is_stable: bool
-    holds: bool
+    adequate: bool
     chosen: bool
 
 class BoardShape(TypedDict):

@@ -18,7 +18,7 @@ def main(target: str, photographs: str, found: str) -> None:
     board = deltille.Target.load(target)
     summary = deltille.ray.detect_to(found, photographs, board)
     print(summary)
-    pictures = pq.read_table(f"{found}/pictures").to_pandas()
+    pictures = pq.read_table(f"{found}/images").to_pandas()
     print(pictures["why"].value_counts())
     for row in pictures[pictures["error"].notna()].itertuples():
         print(f"{row.image}: {row.error}")

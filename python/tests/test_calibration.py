@@ -37,9 +37,9 @@ def test_a_camera_is_calibrated_with_its_uncertainties(calibration, camera, dete
 
 def test_the_next_view_is_where_the_uncertainty_is_largest(board, camera, detections):
     first = deltille.next_view([], board, size_px=(1280, 960))
-    assert first.uncertainty_px is None and not first.is_enough() and "facing the camera" in first.words
+    assert first.uncertainty_px is None and not first.is_enough() and "facing the camera" in first.description
     assert first.pixels.shape == (len(first.labels), 2) and len(first.outlines) == 1
-    assert first.upwards[1, 1] < first.upwards[0, 1] and abs(first.upwards[1, 0] - first.upwards[0, 0]) < 1
+    assert first.up[1, 1] < first.up[0, 1] and abs(first.up[1, 0] - first.up[0, 0]) < 1
     few, more = (deltille.next_view(detections[:count]) for count in (5, 10))
     assert (few.views, more.views) == (5, 10)
     assert few.expected_px < few.uncertainty_px and more.uncertainty_px < few.uncertainty_px
@@ -47,7 +47,7 @@ def test_the_next_view_is_where_the_uncertainty_is_largest(board, camera, detect
     middle = few.camera_from_target.apply(board.corners.mean(axis=0, keepdims=True))
     assert numpy.linalg.norm(middle) == pytest.approx(few.distance_mm)
     other = deltille.next_view(detections[:5], avoid=[few])
-    assert other.expected_px >= few.expected_px and other.words != few.words
+    assert other.expected_px >= few.expected_px and other.description != few.description
     assert json.loads(few.to_json())["schema"] == "deltille/next-view/1"
     assert deltille.next_view(detections[:5], camera=camera).uncertainty_px > 0
     for wrong in ({"model": "auto"}, {"model": "spline"}, {"nearest_mm": -1.0}):
@@ -136,7 +136,7 @@ def test_poses(detections, board, calibration, camera):
 def test_comparisons(detections, board, calibration, tmp_path):
     halves = [deltille.calibrate(detections[i::2], board) for i in range(2)]
     same = deltille.compare(*halves, distance_mm=400)
-    assert same.rms_px < 1 and same.chance is not None and same.pixels.shape == same.differences.shape
+    assert same.rms_px < 1 and same.p_value is not None and same.pixels.shape == same.differences.shape
     moved = calibration.camera
     other = deltille.Camera(1280, 960, (1111, 1111), tuple(moved.parameters[2:4]), distortion=moved.parameters[4:].tolist())
     changed = deltille.compare(calibration, other, region="image")

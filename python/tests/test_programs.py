@@ -38,7 +38,7 @@ def test_errors_have_an_exit_code_and_one_line(tmp_path):
 @pytest.mark.skipif(os.name == "nt", reason="signals of Unix")
 def test_signals_end_the_program_like_the_native_one(tmp_path):
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        command = [script("deltag"), "gen-family", "d36h9", "--time", "60", "--from-nothing", "-o", "a.json"]
+        command = [script("deltag"), "gen-family", "d36h9", "--time", "60", "--from-scratch", "-o", "a.json"]
         process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE)
         time.sleep(3.0)
         start = time.monotonic()

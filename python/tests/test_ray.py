@@ -22,7 +22,7 @@ import pyarrow.parquet as pq
 
 import deltille
 import deltille.ray
-from deltille.ray import CORNERS, PICTURES
+from deltille.ray import CORNERS, IMAGES
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -78,8 +78,8 @@ def test_a_row_for_each_corner_and_for_each_picture(shots, target):
         place = [row["target_x_mm"], row["target_y_mm"], row["target_z_mm"]]
         assert numpy.array_equal(place, of_board[row["id"]])
 
-    pictures = deltille.ray.detect([shots / "b", shots / "a/0.png"], target, per="picture").take_all()
-    assert len(pictures) == 6 and list(pictures[0]) == PICTURES.names
+    pictures = deltille.ray.detect([shots / "b", shots / "a/0.png"], target, per="image").take_all()
+    assert len(pictures) == 6 and list(pictures[0]) == IMAGES.names
     errors = {row["image"]: row["error"] for row in pictures if row["error"]}
     assert list(errors) == [f"{shots}/b/broken.png"] and "broken.png" in errors[f"{shots}/b/broken.png"]
 
@@ -96,20 +96,20 @@ def test_encoded_files_and_paths_of_a_dataset(shots, target):
 
 def test_written_results_are_skipped_and_can_be_calibrated(shots, target, tmp_path):
     out = tmp_path / "found"
-    first = deltille.ray.detect_to(out, shots / "a", target, pictures_per_file=2, batch_size=2)
-    assert (first.pictures, first.errors, first.skipped) == (5, 0, 0)
+    first = deltille.ray.detect_to(out, shots / "a", target, images_per_file=2, batch_size=2)
+    assert (first.images, first.errors, first.skipped) == (5, 0, 0)
     # The file left by a task that is lost between writing its two files.
     orphan = out / "corners/lost-000000.parquet"
     shutil.copy(next((out / "corners").iterdir()), orphan)
     second = deltille.ray.detect_to(out, shots, target)
-    assert (second.pictures, second.errors, second.skipped) == (5, 1, 5)
+    assert (second.images, second.errors, second.skipped) == (5, 1, 5)
     assert not orphan.exists()
     again = deltille.ray.detect_to(out, shots, target)
-    assert (again.pictures, again.skipped) == (0, 10)
+    assert (again.images, again.skipped) == (0, 10)
     assert len(deltille.ray.done(out)) == 10
     assert places(pq.read_table(out / "corners").to_pylist()) == expected(shots, target)
     of_dataset = ray.data.read_binary_files(f"{shots}/a", include_paths=True)
-    assert deltille.ray.detect_to(out, of_dataset, target).pictures == 0
+    assert deltille.ray.detect_to(out, of_dataset, target).images == 0
     assert not [name for _, _, files in os.walk(out) for name in files if name.startswith(".")]
 
     program = shutil.which("deltille", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
@@ -133,9 +133,9 @@ def test_written_results_are_skipped_and_can_be_calibrated(shots, target, tmp_pa
 
 def test_filesystems(shots, target):
     inside = pafs.SubTreeFileSystem(f"{shots}", pafs.LocalFileSystem())
-    pictures = deltille.ray.detect("a", target, per="picture", filesystem=inside).take_all()
+    pictures = deltille.ray.detect("a", target, per="image", filesystem=inside).take_all()
     assert sorted(row["image"] for row in pictures) == [f"a/{index}.png" for index in range(5)]
-    uri = deltille.ray.detect(f"file://{shots}/a", target, per="picture").take_all()
+    uri = deltille.ray.detect(f"file://{shots}/a", target, per="image").take_all()
     assert {row["corners"] for row in uri} == {row["corners"] for row in pictures}
 
 
@@ -149,7 +149,7 @@ def test_errors_are_reported_before_work_starts(shots, target, tmp_path):
     # A folder without images is not an error; a run before may have emptied it.
     (tmp_path / "empty").mkdir()
     assert deltille.ray.detect(tmp_path / "empty", target).count() == 0
-    assert deltille.ray.detect_to(tmp_path / "out", tmp_path / "empty", target).pictures == 0
+    assert deltille.ray.detect_to(tmp_path / "out", tmp_path / "empty", target).images == 0
 
 
 def test_both_tables_are_one_dataset(shots, target):
@@ -161,12 +161,12 @@ def test_both_tables_are_one_dataset(shots, target):
 def test_a_folder_of_another_target_is_rejected(tmp_path):
     board, other = deltille.Board(5, 6, edge_mm=20), deltille.Board(5, 7, edge_mm=20)
     camera = deltille.Camera(320, 240, 300)
-    pictures = tmp_path / "pictures"
+    pictures = tmp_path / "images"
     pictures.mkdir()
     picture, _ = deltille.render(board, camera, eye=(50, 40, 250))
     (pictures / "one.pgm").write_bytes(b"P5 320 240 255\n" + picture.tobytes())
     found = tmp_path / "found"
-    assert deltille.ray.detect_to(found, pictures, board).pictures == 1
+    assert deltille.ray.detect_to(found, pictures, board).images == 1
     assert deltille.ray.detect_to(found, pictures, board).skipped == 1
     for changed in ({"target": other}, {"target": board, "tone": "linear"}):
         with pytest.raises(deltille.DetectionError, match="use another folder"):

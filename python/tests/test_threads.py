@@ -36,7 +36,7 @@ def test_a_detector_can_be_sent_to_other_processes(board, pictures, detections):
 
 
 WITH_INK = """{"schema": "deltille/detection/1", "image": "a", "width": 9, "height": 9, "grids": [], "tone": null,
-    "ink": {"edges": 0.01, "edges_deviation": 0.0001, "um": 200, "um_deviation": 2, "used": true, "pictures": 1}}"""
+    "ink": {"edges": 0.01, "edges_sd": 0.0001, "um": 200, "um_sd": 2, "used": true, "images": 1}}"""
 
 
 def test_other_threads_run_during_detection(board):

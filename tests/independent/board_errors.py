@@ -118,7 +118,7 @@ def simulate(args, seed):
         again = calibrated(args, random, folder / "second", plan + offsets)
         run([args.deltille, "compare", camera, again, "-o", folder / "compared.json"])
         compared = json.loads((folder / "compared.json").read_text())["cameras"][0]
-        repeated = [compared[name] for name in ("rms_px", "expected_px", "chance")]
+        repeated = [compared[name] for name in ("rms_px", "expected_px", "p_value")]
     shutil.rmtree(folder)
     return np.array(off), mapped, repeated
 

@@ -32,7 +32,7 @@ BOARDS = {
 
 # Boards that are photographed too, and how.
 PHOTOGRAPHED = ["usual", "odd", "april"]
-LEAST_FOUND = 0.93
+MIN_FOUND = 0.93
 SCENES = [
     Scene(tilt_deg=0),
     Scene(tilt_deg=30, tone="srgb"),
@@ -145,7 +145,7 @@ def photographs(deltille, folder, name, target, board):
         words.append(f"{who} {len(found)} of {due}, rms {rms[who]:.4f}, median {median:.4f} px")
         if who == "deltille":
             assert (found < WRONG_PX).all(), f"{name}: wrong labels, {found.max()} px"
-            assert len(found) >= LEAST_FOUND * due, f"{name}: {words}"
+            assert len(found) >= MIN_FOUND * due, f"{name}: {words}"
     assert rms["deltille"] <= rms["OpenCV"], f"{name}: {words}"
     return ", ".join(words)
 

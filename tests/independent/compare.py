@@ -51,7 +51,7 @@ def check(distance):
         check=False, stdout=subprocess.DEVNULL,
     )
     said = json.load(open(f"{folder}/compared.json"))["cameras"][0]
-    places = [place for place in said["places"] if place.get("compared")]
+    places = [place for place in said["positions"] if place.get("compared")]
     pixels = np.array([[place["x"], place["y"]] for place in places])
     theirs = np.array([[place["dx"], place["dy"]] for place in places])
     first, second = camera("first"), camera("second")

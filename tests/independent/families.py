@@ -199,7 +199,7 @@ def check(path, program, hidden):
 
     in_mirror = int(np.nonzero(distances(permuted(codes, mirror), turned))[0][0])
     told = json.loads(subprocess.run([program, "verify-family", path, "--json"], check=True, capture_output=True).stdout)[0]
-    assert (told["holds"], told["distance"], told["mirror_distance"]) == (True, least, in_mirror), told
+    assert (told["valid"], told["distance"], told["mirror_distance"]) == (True, least, in_mirror), told
     if "stride" in text["construction"]:
         prove(path.stem, text, codes, turn, program)
     print(f"{path.stem}: {len(codes)} codes of {bits} bits, distance {least}, in a mirror {in_mirror}, {differing.min()} of {len(beside)} pairs differ")

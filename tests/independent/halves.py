@@ -51,7 +51,7 @@ def one(deltille, names, folder, seed, split, options):
     if done.returncode not in (0, 1):
         sys.exit(done.stderr)
     found = json.loads(out.read_text())["cameras"][0]
-    return found["rms_px"], found["expected_px"], found["chance"]
+    return found["rms_px"], found["expected_px"], found["p_value"]
 
 
 def main():

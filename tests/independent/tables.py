@@ -14,7 +14,7 @@ import subprocess
 import sys
 
 CAMERA = "width: 640\nheight: 480\nfocal_px: [600, 600]\ncentre_px: [320, 240]\n"
-TABLES = ("corners", "pictures")
+TABLES = ("corners", "images")
 
 
 def run(*command):
@@ -107,7 +107,7 @@ def main(deltille, folder):
             print(f"not there, and so not asked: {name}")
             continue
         count = compare(rows["corners"], folder / "json")
-        assert [row["image"] for row in rows["pictures"]] == [image.name for image in images]
+        assert [row["image"] for row in rows["images"]] == [image.name for image in images]
         assert camera(anew) == expected, f"another camera from what {name} wrote"
         print(f"{name}: {count} corners as in the JSON, and the same camera from its tables")
 

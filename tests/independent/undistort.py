@@ -51,12 +51,12 @@ for field in ("inside", "whole", "70deg", "900px"):
     truth = cv2.initUndistortRectifyMap(matrix, distortion, np.eye(3), new, size, cv2.CV_32FC1)
     maps = [np.load(made / f"camera-undistorted-map-{axis}.npy") for axis in "xy"]
     inside = maps[0] >= 0
-    assert abs(inside.mean() - view["covered"]) < 1e-9
+    assert abs(inside.mean() - view["valid_fraction"]) < 1e-9
     if field == "inside":
         assert inside.all()
     off = max(np.abs(ours - theirs)[inside].max() for ours, theirs in zip(maps, truth))
     assert off < 1e-3, off
-    x, y, width, height = view["whole_px"]
+    x, y, width, height = view["valid_px"]
     assert inside[y : y + height, x : x + width].all()
 
 run("undistort", "--camera", folder / "camera.yaml", folder / "photos", "-o", made)

@@ -26,8 +26,8 @@ DPI = 300
 # of 1/96 inch and stretches it to them by less than one; pdfium draws rectangles to whole pixels, outwards.
 # Everywhere else there is paper or ink, and no more than rounding may differ.
 EDGE_PX = 2
-MOST_AT_EDGES = {name: px / (2 * EDGE_PX + 1) for name, px in (("poppler", 0.2), ("chromium", 0.67), ("pdfium", 2.0))}
-MOST_ELSEWHERE = 2 / 255
+MAX_AT_EDGES = {name: px / (2 * EDGE_PX + 1) for name, px in (("poppler", 0.2), ("chromium", 0.67), ("pdfium", 2.0))}
+MAX_ELSEWHERE = 2 / 255
 
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
 
@@ -63,11 +63,11 @@ def compare(ours, theirs, most_at_edges):
     """The largest difference elsewhere and at edges, each a part of what is allowed."""
     assert ours.shape == theirs.shape, f"{theirs.shape} px instead of {ours.shape}"
     least, most = around(ours, np.minimum), around(ours, np.maximum)
-    flat = most - least < MOST_ELSEWHERE
+    flat = most - least < MAX_ELSEWHERE
     difference = theirs - ours
     elsewhere = float(np.abs(difference[flat]).max(initial=0.0))
     at_edges = float(np.abs(around(difference, np.add)).max()) / (2 * EDGE_PX + 1) ** 2
-    return elsewhere / MOST_ELSEWHERE, at_edges / most_at_edges
+    return elsewhere / MAX_ELSEWHERE, at_edges / most_at_edges
 
 
 def run(*command):
@@ -143,7 +143,7 @@ def main(deltille, deltag, folder):
                 out = folder / f"{png.stem}.{viewer}.png"
                 source = [folder / f"{name}.pdf", number] if kind == "pdf" else [png.with_suffix(".svg")]
                 draw(*source, size, dpi, out)
-                both = compare(ours, read(out), MOST_AT_EDGES[viewer])
+                both = compare(ours, read(out), MAX_AT_EDGES[viewer])
                 worst[viewer] = tuple(map(max, worst.get(viewer, (0, 0)), both))
         for viewer, (elsewhere, at_edges) in worst.items():
             good = max(elsewhere, at_edges) <= 1

@@ -4,7 +4,7 @@ import { looking } from "./library";
 import { type Shot, made, seen, stem } from "./shared";
 import { surveyed, tints } from "./survey";
 import { words } from "./words";
-import type { Holding, Next, Result, Survey } from "./worker";
+import type { HoldStatus, Next, Result, Survey } from "./worker";
 
 export function calibrate(): HTMLElement {
   let model = "radtan";
@@ -131,9 +131,9 @@ export function calibrate(): HTMLElement {
     next = proposed;
     for (const part of [wish, state, elsewhere]) part.hidden = next === null;
     if (!next) return;
-    const { words: proposal, uncertainty_px: px, expected_px: then, enough } = next;
+    const { description: proposal, uncertainty_px: px, expected_px: then, sufficient } = next;
     const sure = px === null ? "" : words.calibrate.guided(px, then);
-    wish.textContent = enough ? `${words.calibrate.enough} ${sure}` : `${proposal.charAt(0).toUpperCase()}${proposal.slice(1)}. ${sure}`;
+    wish.textContent = sufficient ? `${words.calibrate.enough} ${sure}` : `${proposal.charAt(0).toUpperCase()}${proposal.slice(1)}. ${sure}`;
   }
 
   async function refuse(): Promise<void> {
@@ -242,7 +242,7 @@ export function calibrate(): HTMLElement {
   }
 
   /** Draws the proposed outline of the board, with an arrow to its upper side; it fills while the board is held there. */
-  function outline(context: CanvasRenderingContext2D, { outlines_px, upwards_px }: Next, held: Holding | null): void {
+  function outline(context: CanvasRenderingContext2D, { outlines_px, up_px }: Next, held: HoldStatus | null): void {
     const there = held?.held === "steady" || held?.held === "taken";
     context.save();
     context.strokeStyle = there ? "#30d158" : "#ff9600";
@@ -255,8 +255,8 @@ export function calibrate(): HTMLElement {
       context.fill();
       context.stroke();
     }
-    if (upwards_px) {
-      const [[x, y], [tipX, tipY]] = upwards_px;
+    if (up_px) {
+      const [[x, y], [tipX, tipY]] = up_px;
       const [backX, backY] = [(x - tipX) / 4, (y - tipY) / 4];
       context.lineWidth *= 2;
       context.beginPath();

@@ -2,7 +2,7 @@
 import { el, field, select, shape } from "./dom";
 import { RATES, bar, falsePositives, reading, sizes } from "./family-figures";
 import { drawing as looking } from "./library";
-import { USUAL_FAMILY } from "./settings";
+import { DEFAULT_FAMILY } from "./settings";
 import { words } from "./words";
 import type { FamilyFigures } from "./worker";
 
@@ -156,7 +156,7 @@ export function families(): HTMLElement {
 
   looking.call("families").then((all) => {
     const names = all.map(({ name }) => name);
-    const first = names.includes(USUAL_FAMILY) ? USUAL_FAMILY : (names[0] ?? "");
+    const first = names.includes(DEFAULT_FAMILY) ? DEFAULT_FAMILY : (names[0] ?? "");
     chooser.replaceChildren(field(words.families.family, select(names.map((name) => [name, name]), first, (name) => void choose(name))));
     return choose(first);
   }, (error: unknown) => (facts.textContent = error instanceof Error && error.message ? error.message : words.failed));

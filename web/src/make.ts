@@ -1,7 +1,7 @@
 // Make: settings, a preview of the printed sheet, files, and their verification.
 import { dropZone, el, field, latest, save, select, settled } from "./dom";
 import { LibraryError, drawing, folding, proving } from "./library";
-import { type Settings, asked, isKind, isSolid, nameOf, ofTemplate, query, read, settled as settingsOf, template, PLACES, USUAL_FAMILY } from "./settings";
+import { type Settings, asked, isKind, isSolid, nameOf, ofTemplate, query, read, settled as settingsOf, template, PLACES, DEFAULT_FAMILY } from "./settings";
 import { made } from "./shared";
 import type { Folding } from "./solid";
 import { templates } from "./templates";
@@ -27,7 +27,7 @@ const solidFormats: [string, string][] = [
 const PROVED_BY_ALL = "json";
 const types: Record<string, string> = { pdf: "application/pdf", svg: "image/svg+xml", png: "image/png", json: "application/json" };
 /** Ids are 32-bit numbers. */
-const MOST_IDS = 2 ** 32 - 1;
+const MAX_IDS = 2 ** 32 - 1;
 const papers = ["A5", "A4", "A3", "A2", "A1", "A0", "letter", "legal", "tabloid"];
 
 export function make(): HTMLElement {
@@ -98,7 +98,7 @@ export function make(): HTMLElement {
     const options: [string, string][] = names.map((name) => [name, name]);
     if (!isSquare) options.push([PLACES, text.places]);
     options.push(["", text.noTags]);
-    const usualFamily = isSquare ? "" : USUAL_FAMILY;
+    const usualFamily = isSquare ? "" : DEFAULT_FAMILY;
     // Keep a family from a link or template visible, even if it is unknown.
     if (settings.family && !options.some(([name]) => name === settings.family)) options.push([settings.family, settings.family]);
     const sizes = settings.paper === null || papers.includes(settings.paper) ? papers : [...papers, settings.paper];
@@ -129,10 +129,10 @@ export function make(): HTMLElement {
               ...(ofSolid || settings.kind === "deltille" ? [] : [field(text.tagsIn, select(Object.entries(text.tagsInColours), settings.tags_in, (tags_in) => changed({ tags_in })))]),
               ...(isDense ? [] : [number(text.spacing, "tag_spacing", 1, 500, text.usual)]),
               number(text.border, "tag_border", 0.6, 10, text.usual),
-              ...(isDense ? [] : [number(text.firstId, "first_id", 0, MOST_IDS)]),
+              ...(isDense ? [] : [number(text.firstId, "first_id", 0, MAX_IDS)]),
             ]
           : []),
-        number(text.boardId, "board_id", 0, MOST_IDS),
+        number(text.boardId, "board_id", 0, MAX_IDS),
         box(text.inverted, "inverted"),
         ...(ofSolid
           ? [number(text.faceMargin, "face_margin_mm", 0, 1000, text.usual), box(text.skeleton, "skeleton"), box(text.perFace, "per_face"), box(text.allowSeams, "allow_seams")]

@@ -65,7 +65,7 @@ const CHOICES: Record<string, string[]> = {
 const NUMBERS = ["rows", "cols", "edge_mm", "tag_spacing", "tag_border", "first_id", "board_id", "boards", "tiles", "face_margin_mm", "margin_mm"];
 
 /** The default tag family. */
-export const USUAL_FAMILY = "delTag25h7";
+export const DEFAULT_FAMILY = "delTag25h7";
 
 /** The family of position codes, one in every upright tile. */
 export const PLACES = "dense9";

@@ -44,12 +44,12 @@ export type Proof = { passed: boolean; line: string; sentences: string[]; files:
 export type Seen = { json: string; csv: string; orpc: string; reasons: string[]; ms: number };
 export type Shown = Seen & { width: number; height: number; grey: Uint8Array };
 /** How the board is held, compared with the proposed pose. */
-export type Holding = { held: "unseen" | "elsewhere" | "turned" | "moving" | "blurred" | "steady" | "taken"; part: number };
+export type HoldStatus = { held: "unseen" | "elsewhere" | "turned" | "moving" | "blurred" | "steady" | "taken"; part: number };
 /** The next proposed image, and the projection uncertainty. */
-export type Next = { words: string; enough: boolean; uncertainty_px: number | null; expected_px: number | null; outlines_px: [number, number][][]; upwards_px: [[number, number], [number, number]] | null };
+export type Next = { description: string; sufficient: boolean; uncertainty_px: number | null; expected_px: number | null; outlines_px: [number, number][][]; up_px: [[number, number], [number, number]] | null };
 /** Image coverage: corners per cell, and for each image the tilt of the board and its direction, rad. */
 export type Survey = { size_px: [number, number]; cells: [number, number]; counts: number[]; covered: number; tilts: ([number, number] | null)[] };
-export type Watched = Seen & { keep: boolean; held: Holding | null; pixels: Uint8ClampedArray };
+export type Watched = Seen & { keep: boolean; held: HoldStatus | null; pixels: Uint8ClampedArray };
 export type Recognised = { target: string; spec: Record<string, unknown>; tags: number; corners: number; shown: number };
 export type FamilyFacts = { name: string; kind: string; bits: number; distance: number; codes: number };
 export type FamilyFigures = {
@@ -273,8 +273,8 @@ const calls = {
     const rgba = new Uint8Array(pixels.buffer, pixels.byteOffset, pixels.byteLength);
     return using(Picture.of_colours(width, height, rgba), (picture) => {
       let keep = false;
-      const seen = detect(finder, picture, name, (found) => (keep = watcher?.look(found) ?? false));
-      const held = guide ? (JSON.parse(guide.look(time, seen.json)) as Holding) : null;
+      const seen = detect(finder, picture, name, (found) => (keep = watcher?.observe(found) ?? false));
+      const held = guide ? (JSON.parse(guide.observe(time, seen.json)) as HoldStatus) : null;
       return { ...seen, keep, held, pixels };
     });
   },

@@ -21,7 +21,7 @@ use deltille_core::statistics::median;
 const COORDINATES_A_PARAMETER: usize = 10;
 
 /// Maximum number of views used for the selection, evenly sampled.
-const MOST_VIEWS: usize = 60;
+const MAX_VIEWS: usize = 60;
 
 /// Maximum number of views used for a comparison that is only reported.
 const VIEWS_TO_COMPARE: usize = 24;
@@ -46,7 +46,7 @@ pub struct Candidate {
     /// Whether all its parameters are well-conditioned.
     pub is_stable: bool,
     /// Whether it describes the lens as well as the best one.
-    pub holds: bool,
+    pub is_adequate: bool,
     /// Whether it was selected.
     pub chosen: bool,
     /// The camera that was calibrated from the training views.
@@ -69,7 +69,7 @@ impl Calibration {
     /// # Errors
     /// Returns an error if there are too few views to hold some out, or if no model explains them.
     pub fn choose_model(&self, camera: usize) -> Result<(Model, Vec<Candidate>), CalibrationError> {
-        let views = evenly(&self.cameras[camera].views, MOST_VIEWS);
+        let views = evenly(&self.cameras[camera].views, MAX_VIEWS);
         let coordinates: usize = views.map(|view: &View| 2 * view.corner_count()).sum();
         let of_fit = coordinates - coordinates / HELD_OUT;
         let is_enough = |model: &Model| {
@@ -77,7 +77,7 @@ impl Calibration {
             !is_spline || of_fit >= COORDINATES_A_PARAMETER * parameters(*model)
         };
         let models: Vec<Model> = TRIED.into_iter().filter(is_enough).collect();
-        let candidates = self.tried(camera, &models, MOST_VIEWS)?;
+        let candidates = self.tried(camera, &models, MAX_VIEWS)?;
         let chosen = candidates.iter().find(|candidate| candidate.chosen);
         let model = chosen.map(|chosen| chosen.model).ok_or(CalibrationError::NoStart)?;
         Ok((model, candidates))
@@ -138,7 +138,11 @@ impl Tried {
         };
         Some(Self {
             squares: views.map(|view| (view.name.clone(), of_view(view))).collect(),
-            parameters: found.cameras.iter().map(|camera| camera.found().count()).sum(),
+            parameters: found
+                .cameras
+                .iter()
+                .map(|camera| camera.estimated_parameters().count())
+                .sum(),
             is_stable: found.cameras.iter().all(|camera| camera.ill_conditioned.is_empty()),
             camera: found.cameras.first()?.clone(),
         })
@@ -179,12 +183,12 @@ fn judged(tried: &[(Model, Option<Tried>)]) -> Vec<Candidate> {
         Candidate {
             found: found.as_ref().map(|found| found.camera.clone()),
             parameters: found.as_ref().map_or(parameters(*model), |found| found.parameters),
-            holds: own.zip(best).is_some_and(|(own, best)| own <= (1.0 + SAME) * best),
+            is_adequate: own.zip(best).is_some_and(|(own, best)| own <= (1.0 + SAME) * best),
             ..candidate(*model, own.map(|own| (own / 2.0).sqrt()), is_stable)
         }
     });
     let mut candidates: Vec<Candidate> = candidates.collect();
-    let holding = candidates.iter_mut().filter(|candidate| candidate.holds);
+    let holding = candidates.iter_mut().filter(|candidate| candidate.is_adequate);
     let chosen = holding.min_by_key(|candidate| (!candidate.is_stable, candidate.parameters));
     chosen.into_iter().for_each(|chosen| chosen.chosen = true);
     candidates
@@ -195,6 +199,6 @@ fn parameters(model: Model) -> usize {
 }
 
 fn candidate(model: Model, held_out_px: Option<f64>, is_stable: bool) -> Candidate {
-    let (parameters, holds, chosen, found) = (parameters(model), false, false, None);
-    Candidate { model, parameters, held_out_px, is_stable, holds, chosen, found }
+    let (parameters, is_adequate, chosen, found) = (parameters(model), false, false, None);
+    Candidate { model, parameters, held_out_px, is_stable, is_adequate, chosen, found }
 }

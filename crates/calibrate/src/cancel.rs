@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A flag by which the caller stops a calibration, see [`Calibration::stopped_by`](crate::Calibration::stopped_by).
+/// A flag by which the caller stops a calibration, see [`Calibration::cancelled_by`](crate::Calibration::cancelled_by).
 ///
 /// The flag is not part of the problem, so any two flags are equal.
 #[derive(Clone, Debug, Default)]
@@ -38,7 +38,7 @@ mod tests {
         let flag = Arc::new(AtomicBool::new(true));
         let calibration = Calibration::new([Pose::IDENTITY]).camera("c", Vec::new(), Model::Radtan);
         assert_ne!(calibration.solve(), Err(CalibrationError::Stopped));
-        let stopped = calibration.clone().stopped_by(flag);
+        let stopped = calibration.clone().cancelled_by(flag);
         assert_eq!(stopped, calibration);
         assert_eq!(stopped.solve(), Err(CalibrationError::Stopped));
     }

@@ -6,17 +6,17 @@ use deltille_core::setting::Setting::CalibrationRefinePanels;
 
 /// Why the motion of a rig does not determine the pose of a camera that shares no target with the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TooPlain {
+pub enum DegenerateMotion {
     /// The rig did not rotate.
-    NoTurn,
+    NoRotation,
     /// The rig rotated about one axis only.
     OneAxis,
 }
 
-impl fmt::Display for TooPlain {
+impl fmt::Display for DegenerateMotion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::NoTurn => {
+            Self::NoRotation => {
                 "and the rig did not rotate, so the position of the camera relative to the others is \
                  undetermined; rotate the rig, or the targets in front of it, by at least 20° about two axes"
             }
@@ -80,7 +80,7 @@ pub enum CalibrationError {
     },
     /// Given intrinsics that contradict the images, which may be the reason for the failure.
     #[error("the camera given for {cameras} did not take the images: {error}")]
-    ForeignCameras {
+    WrongCameras {
         /// Names of the cameras.
         cameras: String,
         /// The failure.
@@ -179,7 +179,7 @@ pub enum CalibrationError {
         /// Name of the target.
         target: String,
         /// The rotation that was missing.
-        why: TooPlain,
+        why: DegenerateMotion,
     },
     /// Cameras that moved relative to each other.
     #[error(
@@ -210,7 +210,7 @@ pub enum CalibrationError {
          photographed"
     )]
     NoStart,
-    /// Stopped by the caller, see [`Calibration::stopped_by`](crate::Calibration::stopped_by).
+    /// Stopped by the caller, see [`Calibration::cancelled_by`](crate::Calibration::cancelled_by).
     #[error("interrupted before the calibration was finished")]
     Stopped,
     /// Parameters that the views do not determine.

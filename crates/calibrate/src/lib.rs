@@ -50,7 +50,7 @@ mod solve;
 mod start;
 mod uncertainty;
 
-pub use adjust::finding::{Finding, Moved, Shared};
+pub use adjust::finding::{Finding, Moved, OutlierPattern};
 pub use adjust::lack_of_fit::LackOfFit;
 pub use automatic::Candidate;
 pub use compare::comparison::{
@@ -58,14 +58,14 @@ pub use compare::comparison::{
 };
 pub use compare::verdict::Verdict;
 pub use diagnose::diagnosis::Diagnosis;
-pub use diagnose::model_selection::{Instead, Remedy};
+pub use diagnose::messages::Messages;
+pub use diagnose::model_selection::{Alternative, Remedy};
 pub use diagnose::one_state::{BoardStretch, CameraChange, ChangedIntrinsic, RollingShutter};
-pub use diagnose::words::Words;
-pub use error::{CalibrationError, TooPlain};
+pub use error::{CalibrationError, DegenerateMotion};
 pub use estimate::coverage::Coverage;
 pub use estimate::image_circle::ImageCircle;
-pub use estimate::lens_end::LensEnd;
-pub use estimate::target_map::{CornerOffset, LEAST_TO_MEASURE, TargetMap};
+pub use estimate::lens_limit::LensLimit;
+pub use estimate::target_map::{CornerOffset, MIN_VIEWS_TO_MEASURE, TargetMap};
 pub use estimate::uncertainty_map::UncertaintyMap;
 pub use estimate::values::{
     CameraEstimate, Corner, Estimate, FrameEstimate, Parameter, TargetEstimate, ViewEstimate,
@@ -76,15 +76,15 @@ pub use input::grid::UntaggedGrid;
 pub use input::loss::Loss;
 pub use input::observation::Observation;
 pub use input::observation::{Sighting, View};
-pub use input::panel::PanelPlace;
+pub use input::panel::PanelPrior;
 pub use input::panel::PanelRef;
 pub use input::reference::Reference;
-pub use input::views::{Named, Shown, views};
+pub use input::views::{Named, ViewSet, views};
 pub use input::weights::Weights;
 pub use matrix::Matrix;
 pub use model::{Model, ModelError};
 pub use next_view::guide::{Guide, Guided, NextView, ProposedCorner};
-pub use next_view::holding::{Held, Holding};
+pub use next_view::holding::{HoldStatus, HoldTracker};
 pub use problem::shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};
 pub use start::symmetry::LabelRotation;
 pub use uncertainty::projection::{ObservedCovariance, ProjectionUncertainty, Source};

@@ -1,7 +1,7 @@
 //! The pose of a target in an image of a known camera.
 
 use super::diagnose::diagnosis::Diagnosis;
-use super::diagnose::words::Words;
+use super::diagnose::messages::Messages;
 use super::error::CalibrationError;
 use super::estimate::values::Estimate;
 use super::input::calibration::Calibration;
@@ -19,9 +19,9 @@ impl Calibration {
             found => found?,
         };
         let said = found.diagnose();
-        let foreign = said.iter().find(|said| matches!(said, Diagnosis::ForeignCamera { .. }));
+        let foreign = said.iter().find(|said| matches!(said, Diagnosis::WrongCamera { .. }));
         if let Some(foreign) = foreign {
-            return Ok(Err(Words::new(&found, None).sentence(foreign)));
+            return Ok(Err(Messages::new(&found, None).sentence(foreign)));
         }
         if found.frames.is_empty() {
             let excluded = found.excluded.first().map(|out| out.reason.to_string());

@@ -224,7 +224,7 @@ impl Model {
     }
 
     /// Returns the number of estimated lens parameters, from the first; the others are zero.
-    pub fn found(self) -> usize {
+    pub fn parameter_count(self) -> usize {
         self.lens().names().len().min(self.facts().found)
     }
 
@@ -264,7 +264,7 @@ impl Model {
     /// Returns, for each camera parameter, whether the model estimates it.
     pub fn free(self) -> Vec<bool> {
         let count = PROJECTION_PARAMETERS.len();
-        let (lens, found) = (self.lens(), self.found());
+        let (lens, found) = (self.lens(), self.parameter_count());
         let free = (0..lens.names().len()).map(|i| i < found);
         without_gauge(&lens, iter::repeat_n(true, count).chain(free).collect())
     }

@@ -43,7 +43,7 @@ impl Calibration {
         let (own, test) = self.split()?;
         let estimate = own.adjusted().map_err(|error| match own.foreign_cameras().as_slice() {
             [] => error,
-            foreign => CalibrationError::ForeignCameras {
+            foreign => CalibrationError::WrongCameras {
                 cameras: foreign
                     .iter()
                     .map(|&c| &*self.cameras[c].name)

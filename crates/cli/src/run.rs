@@ -20,7 +20,7 @@ pub const FAILED: u8 = 1;
 pub const UNDECIDED: u8 = 3;
 
 /// Number of characters kept at either end of a long message.
-const MOST_CHARACTERS: usize = 1000;
+const MAX_CHARACTERS: usize = 1000;
 
 /// Interruption by Ctrl-C or another signal, with the status of the work; see [`interrupt::leave`].
 #[derive(Debug, thiserror::Error)]
@@ -93,11 +93,11 @@ pub fn message(error: &anyhow::Error) -> String {
 /// Cuts the middle out of a line that is too long to read, because messages may quote arbitrary file content.
 fn shortened(line: &str) -> String {
     let count = line.chars().count();
-    if count <= 2 * MOST_CHARACTERS {
+    if count <= 2 * MAX_CHARACTERS {
         return line.to_owned();
     }
-    let start: String = line.chars().take(MOST_CHARACTERS).collect();
-    let end: String = line.chars().skip(count - MOST_CHARACTERS).collect();
+    let start: String = line.chars().take(MAX_CHARACTERS).collect();
+    let end: String = line.chars().skip(count - MAX_CHARACTERS).collect();
     format!("{start} … {end}")
 }
 

@@ -7,7 +7,7 @@
 //! Fields of files name their quantity, so that a value outside the range is rejected with the name of the field:
 //!
 //! ```text
-//! #[serde(deserialize_with = "quantity::place_mm::de")]
+//! #[serde(deserialize_with = "quantity::position_mm::de")]
 //! pub target_mm: DVec3,
 //! ```
 
@@ -186,7 +186,7 @@ macro_rules! quantities {
 
 quantities! {
     /// A coordinate in space or on paper.
-    place_mm: -1e6 to 1e6 "mm";
+    position_mm: -1e6 to 1e6 "mm";
     /// A length that may be zero.
     length_mm: 0.0 to 1e6 "mm";
     /// An edge of a tile.
@@ -266,7 +266,7 @@ mod tests {
         assert!(message.starts_with("1e308 is not between 1e-20 and 1e8 px²"), "{message}");
         for bad in ["nan", "inf", "-1e308", "x", ""] {
             assert_eq!(
-                place_mm::RANGE.parse(bad).unwrap_err(),
+                position_mm::RANGE.parse(bad).unwrap_err(),
                 "must be between -1000000 and 1000000 mm"
             );
         }

@@ -22,10 +22,10 @@ pub fn quantile(values: &mut [f64], part: f64) -> Option<f64> {
 /// Returns the upper tail probability of the χ² distribution with `freedom` degrees of freedom.
 ///
 /// ```
-/// let probability = deltille_core::statistics::chi_squared_chance(11.07, 5);
+/// let probability = deltille_core::statistics::chi_squared_p_value(11.07, 5);
 /// assert!((probability - 0.05).abs() < 1e-4);
 /// ```
-pub fn chi_squared_chance(sum: f64, freedom: usize) -> f64 {
+pub fn chi_squared_p_value(sum: f64, freedom: usize) -> f64 {
     let half = sum.max(0.0) / 2.0;
     if !half.is_finite() {
         return 0.0;
@@ -50,10 +50,10 @@ pub fn chi_squared_chance(sum: f64, freedom: usize) -> f64 {
 /// Returns the upper tail probability of the F distribution with `above` and `below` degrees of freedom.
 ///
 /// ```
-/// let probability = deltille_core::statistics::f_chance(3.326, 5.0, 10.0);
+/// let probability = deltille_core::statistics::f_p_value(3.326, 5.0, 10.0);
 /// assert!((probability - 0.05).abs() < 1e-4);
 /// ```
-pub fn f_chance(ratio: f64, above: f64, below: f64) -> f64 {
+pub fn f_p_value(ratio: f64, above: f64, below: f64) -> f64 {
     let (a, b) = (below / 2.0, above / 2.0);
     let x = below / (below + above * ratio.max(0.0));
     // The continued fraction converges fast on one side of the mean.
@@ -100,7 +100,7 @@ mod tests {
             (50.0, 2.0, 5.0, 4.948251479e-04),
         ];
         for (ratio, above, below, probability) in of_ratios {
-            let found = f_chance(ratio, above, below);
+            let found = f_p_value(ratio, above, below);
             assert!(
                 (found / probability - 1.0_f64).abs() < 1e-7,
                 "{ratio} {above} {below}: {found}"
@@ -113,7 +113,7 @@ mod tests {
             (100.0, 31, 3.464370245e-09),
         ];
         for (sum, freedom, probability) in of_sums {
-            let found = chi_squared_chance(sum, freedom);
+            let found = chi_squared_p_value(sum, freedom);
             assert!((found / probability - 1.0_f64).abs() < 1e-7, "{sum} {freedom}: {found}");
         }
     }

@@ -30,9 +30,9 @@ pub fn p_value(probability: f64) -> String {
 }
 
 /// Maximum number of characters of foreign text that a message quotes.
-pub const MOST_QUOTED: usize = 80;
+pub const MAX_QUOTED: usize = 80;
 
-/// Shortens foreign text for a message to at most [`MOST_QUOTED`] characters. The text may be a whole file.
+/// Shortens foreign text for a message to at most [`MAX_QUOTED`] characters. The text may be a whole file.
 ///
 /// ```
 /// use deltille_core::words::cut;
@@ -41,10 +41,10 @@ pub const MOST_QUOTED: usize = 80;
 /// assert_eq!(cut(&"x".repeat(5000)).chars().count(), 80);
 /// ```
 pub fn cut(text: &str) -> Cow<'_, str> {
-    if text.char_indices().nth(MOST_QUOTED).is_none() {
+    if text.char_indices().nth(MAX_QUOTED).is_none() {
         return Cow::Borrowed(text);
     }
-    Cow::Owned(text.chars().take(MOST_QUOTED - 1).chain(['…']).collect())
+    Cow::Owned(text.chars().take(MAX_QUOTED - 1).chain(['…']).collect())
 }
 
 /// Formats a [`cut`] text between backquotes.
@@ -68,7 +68,7 @@ pub fn quoted(text: &str) -> String {
 /// assert_eq!(with_short_quotes(&message).chars().count(), 80 + "family `` is unknown".len());
 /// ```
 pub fn with_short_quotes(message: &str) -> Cow<'_, str> {
-    if message.char_indices().nth(MOST_QUOTED).is_none() {
+    if message.char_indices().nth(MAX_QUOTED).is_none() {
         return Cow::Borrowed(message);
     }
     let (mut short, mut rest) = (String::new(), message);
@@ -98,8 +98,8 @@ pub fn places(deviation: f64) -> usize {
 /// move the cursor, change colours or reverse the writing direction; keeps tabs.
 pub fn shown(text: &str) -> Cow<'_, str> {
     let is_harmful = |c: char| {
-        let turns = matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-        turns || c.is_control() && c != '\t'
+        let rotations = matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+        rotations || c.is_control() && c != '\t'
     };
     if !text.contains(is_harmful) {
         return Cow::Borrowed(text);

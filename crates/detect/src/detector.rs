@@ -161,7 +161,7 @@ impl Detector {
             // The same ink spread in mm, as a fraction of edges of another length.
             (Some(edge_mm), Some(other_mm)) => {
                 let mut ink = ink;
-                for edges in [&mut ink.edges, &mut ink.edges_deviation] {
+                for edges in [&mut ink.edges, &mut ink.edges_sd] {
                     *edges = *edges * edge_mm / other_mm;
                 }
                 Box::new(other.with_ink(ink))

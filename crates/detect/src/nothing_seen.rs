@@ -10,7 +10,7 @@ use deltille_core::lattice::GridKind;
 use deltille_core::raster::{Gray, PYRAMID_FULL_SCALE, Pyramid};
 
 /// Fewest corners of a grid of the other tiling that is reported as a mistaken tiling.
-const LEAST_OTHER_CORNERS: usize = 20;
+const MIN_OTHER_CORNERS: usize = 20;
 
 /// Returns the reason why an image with this number of corners has no grid.
 pub(super) fn nothing_found<const N: usize>(pyramid: &Pyramid, corners: usize) -> Reason {
@@ -23,7 +23,7 @@ pub(super) fn nothing_found<const N: usize>(pyramid: &Pyramid, corners: usize) -
         GridKind::Deltille => most_corners(&SaddleFinder::<CHECKER>::new(), &half),
         GridKind::Checker => most_corners(&SaddleFinder::<DELTILLE>::new(), &half),
     });
-    if others >= LEAST_OTHER_CORNERS {
+    if others >= MIN_OTHER_CORNERS {
         return Reason::new(ReasonKind::OtherTiling, [("corners", others as f64)]);
     }
     let reason = why::nothing_found(pyramid, corners);
@@ -55,7 +55,7 @@ fn edge_of_small_tiles<const N: usize>(level: &Gray<i16>) -> Option<f64> {
     let found = grids(&finder, &pyramid, &finder.find(&pyramid), None);
     let largest = found.iter().max_by_key(|grid| grid.len())?;
     let edge_px = why::edge_px(largest)? / TIMES as f64;
-    (largest.len() >= LEAST_OTHER_CORNERS && edge_px < MIN_UNTAGGED_EDGE_PX).then_some(edge_px)
+    (largest.len() >= MIN_OTHER_CORNERS && edge_px < MIN_UNTAGGED_EDGE_PX).then_some(edge_px)
 }
 
 /// Returns the first pixel of a part of the given columns and rows, around the square with the most contrast.

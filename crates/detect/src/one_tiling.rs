@@ -12,7 +12,7 @@ use crate::grid::foreshortened::foreshortened_grids;
 use crate::grid::grids::grids;
 use crate::grid::saddle_grid::SaddleGrid;
 use crate::grid::tile_shape::is_of_squares;
-use crate::labels::grid_labels::{FoundGrid, Labels, MOST_CORNERS, report_once};
+use crate::labels::grid_labels::{FoundGrid, Labels, MAX_CORNERS, report_once};
 use crate::labels::placement::labeller::Budget;
 use crate::refine::clearance::TagAreas;
 use crate::refine::model::fitter::CornerFitter;
@@ -38,11 +38,11 @@ const fn max_untagged_blur(kind: GridKind) -> f64 {
 }
 
 /// Maximum number of reported reasons for missing labels. The largest grids are reported.
-const MOST_REASONS: usize = 3;
+const MAX_REASONS: usize = 3;
 
 /// Fewest pixels per corner of a level on which the whole board is searched. If the board covers a third of the image,
 /// its edges are 18 px long there.
-const LEAST_PX2_A_CORNER: usize = 1000;
+const MIN_PX2_A_CORNER: usize = 1000;
 
 /// Minimum edge length on a coarser level, px. The corner fit reads pixels up to this distance, and pixels of the next
 /// corners displace it.
@@ -176,7 +176,7 @@ impl OneTiling {
                 reason.grid = Some(i);
                 Some(reason)
             };
-            grids.iter().enumerate().filter_map(of_grid).take(MOST_REASONS).collect()
+            grids.iter().enumerate().filter_map(of_grid).take(MAX_REASONS).collect()
         } else {
             Vec::new()
         };
@@ -211,7 +211,7 @@ impl OneTiling {
         let whole = self.labels.whole()?;
         let pyramid = frame.pyramid;
         let levels = pyramid.levels();
-        let least = LEAST_PX2_A_CORNER * whole.corners();
+        let least = MIN_PX2_A_CORNER * whole.corners();
         let coarsest = levels.iter().rposition(|level| level.pixels().len() >= least)?;
         let seen = (1..=coarsest).rev().find_map(|level| {
             let coarse = pyramid.from_level(level);
@@ -341,7 +341,7 @@ impl OneTiling {
         let (count, mut corners) = (grids.len(), 0);
         grids.retain(|(grid, _)| {
             corners += grid.corners.len();
-            is_confirmed(grid) || corners <= MOST_CORNERS
+            is_confirmed(grid) || corners <= MAX_CORNERS
         });
         left_out.extend((grids.len() < count).then(|| Reason::new(ReasonKind::TooManyGrids, [])));
         // Labelled grids by panel, then the others; a stable sort keeps the largest first.

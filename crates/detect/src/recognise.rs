@@ -24,16 +24,16 @@ use deltille_core::targets::{
 };
 
 /// Maximum number of grids that are read, the largest first.
-const MOST_GRIDS: usize = 4;
+const MAX_GRIDS: usize = 4;
 
 /// Fewest corners of a grid that is read: those of a tile and its neighbours, which a tag needs.
-const FEWEST_CORNERS: usize = 12;
+const MIN_CORNERS: usize = 12;
 
 /// Maximum number of tiles that are read in a grid.
-const MOST_TILES: usize = 600;
+const MAX_TILES: usize = 600;
 
 /// Evidence from which tags are significant, nats: noise exceeds it once in a million, for each way to read them.
-const LEAST_EVIDENCE: f64 = 18.0;
+const MIN_EVIDENCE: f64 = 18.0;
 
 /// Cost of a corner seen beyond a board, relative to a corner of the board that is not seen. Covers hide corners, but
 /// hardly anything imitates them. With 3, an outer row is accepted from a quarter of its corners on; with 1 it would be
@@ -41,7 +41,7 @@ const LEAST_EVIDENCE: f64 = 18.0;
 const COST_BEYOND: usize = 3;
 
 /// Maximum number of rows and columns of a board beyond the visible ones.
-const MOST_BEYOND: u32 = 12;
+const MAX_BEYOND: u32 = 12;
 
 /// Widest spacing of tags that is tried.
 const WIDEST_SPACING: i32 = 8;
@@ -106,7 +106,7 @@ impl Recogniser {
         let mut all = self.sightings::<DELTILLE>(image, &pyramid);
         all.extend(self.sightings::<CHECKER>(image, &pyramid));
         all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-        all.truncate(MOST_GRIDS);
+        all.truncate(MAX_GRIDS);
         let boards = all.iter().filter_map(|seen| Some((seen, TargetSpec::Board(seen.board()?))));
         let solids =
             all.iter().take(1).flat_map(|seen| seen.solids().into_iter().map(move |of| (seen, of)));
@@ -138,7 +138,7 @@ struct Seen {
     /// Its tile in the grid.
     tile: Tile,
     id: u32,
-    turns: u8,
+    rotations: u8,
 }
 
 /// Tags of a family in a grid, all with the same orientation.
@@ -167,8 +167,8 @@ impl Recogniser {
         }
         let finder = SaddleFinder::<N>::new();
         let mut found = grids(&finder, pyramid, &finder.find(pyramid), None);
-        found.retain(|grid| grid.len() >= FEWEST_CORNERS);
-        found.truncate(MOST_GRIDS);
+        found.retain(|grid| grid.len() >= MIN_CORNERS);
+        found.truncate(MAX_GRIDS);
         let places = match kind {
             GridKind::Deltille => vec![(TagsIn::Black, TagSpec::default().border_bits)],
             GridKind::Checker => [TagsIn::Black, TagsIn::White]
@@ -183,7 +183,7 @@ impl Recogniser {
                 let reader = TagReader::new(&families[0].family, place);
                 for (grid, inverted) in found.iter().flat_map(|grid| [(grid, false), (grid, true)])
                 {
-                    let read = reader.read(image, grid, inverted, MOST_TILES);
+                    let read = reader.read(image, grid, inverted, MAX_TILES);
                     all.extend(families.iter().filter_map(|known| {
                         let (tags, evidence) = same_orientation(&read, known, &reader)?;
                         let family = &known.family;
@@ -212,7 +212,7 @@ impl<'a> Way<'a> {
         let Self { kind, family, border_bits, tags_in, inverted } = self;
         let upright = LatticeMap::new(kind, i32::from(turns_of(kind, &seen[0])), Vertex::new(0, 0));
         let at = |seen: &Seen| {
-            let lower_left = seen.tile.vertices().nth(usize::from(seen.turns));
+            let lower_left = seen.tile.vertices().nth(usize::from(seen.rotations));
             (upright.apply(lower_left.unwrap_or(seen.tile.anchor)), seen.id)
         };
         let tags = seen.iter().map(at).collect();
@@ -223,7 +223,7 @@ impl<'a> Way<'a> {
 
 /// Returns the lattice rotations that set a tag upright.
 fn turns_of(kind: GridKind, seen: &Seen) -> u8 {
-    panel_from_grid(seen.tile, kind.tag_tile(Vertex::new(0, 0)), seen.turns).turns()
+    panel_from_grid(seen.tile, kind.tag_tile(Vertex::new(0, 0)), seen.rotations).rotations()
 }
 
 /// Returns the tags of a family that have the same orientation, as on a board, and the evidence for them. Returns
@@ -242,14 +242,14 @@ fn same_orientation(
         }
         let Some(decoded) = decoder.decode(word, family.correctable() / 2) else { continue };
         let chance = chances.get(decoded.errors as usize).copied().unwrap_or(1.0);
-        let seen = Seen { tile: reading.tile, id: decoded.id, turns: decoded.turns };
+        let seen = Seen { tile: reading.tile, id: decoded.id, rotations: decoded.rotations };
         let (tags, evidence) = by_turns.entry(turns_of(family.kind(), &seen)).or_default();
         tags.push(seen);
         // Some of all tiles may look like tags by coincidence.
         *evidence -= (chance * read.readings.len() as f64).min(1.0).ln();
     }
     let best = by_turns.into_values().max_by(|a, b| a.1.total_cmp(&b.1));
-    best.filter(|(tags, evidence)| tags.len() > 1 && *evidence > LEAST_EVIDENCE)
+    best.filter(|(tags, evidence)| tags.len() > 1 && *evidence > MIN_EVIDENCE)
 }
 
 impl Sighting<'_> {
@@ -270,7 +270,7 @@ impl Sighting<'_> {
             GridKind::Checker => range(|v| v.col)?,
             GridKind::Deltille => self.longest_row()?,
         };
-        let sizes = |seen: i32| (seen - 2).max(2) as u32..=(seen.max(2) as u32 + MOST_BEYOND);
+        let sizes = |seen: i32| (seen - 2).max(2) as u32..=(seen.max(2) as u32 + MAX_BEYOND);
         let mut best: Option<(usize, BoardSpec)> = None;
         for rows in sizes(rows) {
             for cols in sizes(cols) {
@@ -297,7 +297,7 @@ impl Sighting<'_> {
             }
         }
         let (_, spec) = best?;
-        Some(BoardSpec { edge_mm: BoardSpec::USUAL_EDGE_MM, ..spec })
+        Some(BoardSpec { edge_mm: BoardSpec::DEFAULT_EDGE_MM, ..spec })
     }
 
     /// Returns the number of corners in the longest row.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use deltille_core::family::places;
+use deltille_core::family::positions;
 use deltille_core::lattice::GridKind;
 use deltille_core::setting::Setting::{BoardBoardId, TagFirstId};
 use deltille_core::targets::{Target, UnknownCodes};
@@ -34,7 +34,7 @@ pub enum SceneError {
     /// Two targets contain the same tag.
     #[error(
         "{first} and {second} share tag {id} of {family}: change the ids of one target with {}",
-        if family == places::NAME { BoardBoardId } else { TagFirstId }
+        if family == positions::NAME { BoardBoardId } else { TagFirstId }
     )]
     SameTag {
         /// Name of the first target.

@@ -1,6 +1,6 @@
 //! Known properties of the printed sheet, applied to views before calibration.
 
-use deltille_calibrate::{PanelPlace, Reference, View};
+use deltille_calibrate::{PanelPrior, Reference, View};
 use deltille_core::setting::Setting::{CalibrationRefinePanels, PrintScale, SightingBend};
 use deltille_core::targets::{Target, TargetSpec};
 use deltille_layout::SheetLayout;
@@ -56,7 +56,7 @@ impl Sheet {
     ///
     /// # Errors
     /// Returns an error if these properties do not apply to the reference.
-    pub fn panels(&self, reference: &Reference) -> Result<Vec<PanelPlace>, SheetUseError> {
+    pub fn panels(&self, reference: &Reference) -> Result<Vec<PanelPrior>, SheetUseError> {
         let scale = match reference {
             Reference::Target(target) => self.solid_scale(target)?,
             Reference::Scene(_) => {

@@ -9,13 +9,13 @@ use rayon::prelude::*;
 use deltille_core::camera::PixelMap;
 
 /// Maximum number of samples along each side of a pixel. A pixel that covers more source pixels is averaged over this number.
-const MOST_PLACES: f32 = 8.0;
+const MAX_POSITIONS: f32 = 8.0;
 
 /// Parameter a of the cubic convolution of Keys (1981) that gives third-order accuracy.
 const KEYS: f32 = -0.5;
 
 /// Maximum number of channels of a pixel.
-const MOST_CHANNELS: usize = 4;
+const MAX_CHANNELS: usize = 4;
 
 /// Resamples `image` by bicubic interpolation at the positions of `map`, px in `image` for each pixel of the result. A pixel
 /// that covers several source pixels is their mean. Pixels without a position are black. Depth and channels are kept, except
@@ -92,12 +92,12 @@ fn seen<P>(
     image: &Buffer<P>,
     map: &PixelMap,
     [column, row]: [usize; 2],
-) -> Option<[f32; MOST_CHANNELS]>
+) -> Option<[f32; MAX_CHANNELS]>
 where
     P: Pixel,
     P::Subpixel: Depth,
 {
-    let place = |x: usize, y: usize| map.places()[y * map.width() + x];
+    let place = |x: usize, y: usize| map.positions()[y * map.width() + x];
     let here = place(column, row);
     if here[0].is_nan() {
         return None;
@@ -112,9 +112,9 @@ where
     let above = row.checked_sub(1).map(|y| place(column, y));
     let across = along(right, 1.0).or_else(|| along(left, -1.0)).unwrap_or_default();
     let down = along(below, 1.0).or_else(|| along(above, -1.0)).unwrap_or_default();
-    let parts = |step: [f32; 2]| step[0].hypot(step[1]).round().clamp(1.0, MOST_PLACES);
+    let parts = |step: [f32; 2]| step[0].hypot(step[1]).round().clamp(1.0, MAX_POSITIONS);
     let [columns, rows] = [parts(across), parts(down)];
-    let mut sum = [0.0; MOST_CHANNELS];
+    let mut sum = [0.0; MAX_CHANNELS];
     for i in 0..rows as usize {
         for j in 0..columns as usize {
             let offset = |index: usize, of: f32| (index as f32 + 0.5) / of - 0.5;
@@ -136,7 +136,7 @@ fn weights(part: f32) -> [f32; 4] {
 }
 
 /// The interpolated value at a position in an image, px; beyond the border the outermost pixels are repeated.
-fn cubic<P>(image: &Buffer<P>, [x, y]: [f32; 2]) -> [f32; MOST_CHANNELS]
+fn cubic<P>(image: &Buffer<P>, [x, y]: [f32; 2]) -> [f32; MAX_CHANNELS]
 where
     P: Pixel,
     P::Subpixel: Depth,
@@ -146,7 +146,7 @@ where
         (at.floor() as i64 + step as i64 - 1).clamp(0, i64::from(side) - 1) as u32
     };
     let columns: [u32; 4] = std::array::from_fn(|j| near(x, j, image.width()));
-    let mut sum = [0.0; MOST_CHANNELS];
+    let mut sum = [0.0; MAX_CHANNELS];
     for (i, by_row) in by_row.into_iter().enumerate() {
         let row = near(y, i, image.height());
         for (column, by_column) in columns.into_iter().zip(by_column) {

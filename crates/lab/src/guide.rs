@@ -43,10 +43,10 @@ const FOUND_EDGE_PX: f64 = 12.0;
 const FOUND_MARGIN_PX: f64 = 5.0;
 
 /// Number of corners below which the view is taken again.
-const LEAST_CORNERS: usize = 20;
+const MIN_CORNERS: usize = 20;
 
 /// Smallest visible fraction of a board that may be cut off in a random image.
-const LEAST_PART: f64 = 0.5;
+const MIN_PART: f64 = 0.5;
 
 /// Blur and noise of rendered images, those of a good webcam: standard deviations in px and as a fraction of full
 /// scale.
@@ -99,7 +99,7 @@ pub struct Worth {
     /// Difference from the true camera over the image at infinity, px, RMS per axis.
     pub off_px: f64,
     /// The same for points at the median distance of the corners, where a shift of the camera is compensated, too.
-    pub off_near_px: f64,
+    pub error_near_px: f64,
     /// Uncertainty from noise that the estimate reports over the image at infinity, px, as the same mean.
     pub said_px: f64,
     /// Uncertainty that the guide predicted for the last view, px.
@@ -268,7 +268,7 @@ impl World<'_> {
             let off = self.normal(middle.length()) * DVec3::new(HAND_ASIDE, HAND_ASIDE, HAND_DEEP);
             let hand = Pose { rotation: turn, translation: middle - turn * middle + off };
             let view = self.view(&hand.after(&pose), index);
-            if view.corner_count() >= LEAST_CORNERS {
+            if view.corner_count() >= MIN_CORNERS {
                 return view;
             }
         }
@@ -293,7 +293,7 @@ impl World<'_> {
 
     /// Returns a view taken without a guide that shows the whole board, or at least half of it.
     fn unguided(&mut self, index: usize, whole: bool) -> View {
-        let part = if whole { 1.0 } else { LEAST_PART };
+        let part = if whole { 1.0 } else { MIN_PART };
         let least = (part * self.board.panels[0].corners.len() as f64).ceil() as usize;
         let camera = self.subject.camera.clone();
         let panel = &self.board.panels[0];
@@ -319,7 +319,7 @@ impl World<'_> {
                 continue;
             }
             let view = self.view(&pose, index);
-            if view.corner_count() >= LEAST_CORNERS {
+            if view.corner_count() >= MIN_CORNERS {
                 return view;
             }
         }
@@ -390,7 +390,7 @@ impl World<'_> {
         Worth {
             views,
             off_px: off(None),
-            off_near_px: off(near),
+            error_near_px: off(near),
             said_px: over_image(found).unwrap_or(f64::INFINITY),
             expected_px,
         }
@@ -452,7 +452,7 @@ pub fn text(setup: Setup, runs: &[Run]) -> String {
                 text,
                 "{name:9} {views:3} {kind:10}   {:9.4}  {:14.4}  {:12.4}  {note}",
                 middle(&of, |run| which(run).map(|worth| worth.off_px)),
-                middle(&of, |run| which(run).map(|worth| worth.off_near_px)),
+                middle(&of, |run| which(run).map(|worth| worth.error_near_px)),
                 middle(&of, |run| which(run).map(|worth| worth.said_px)),
             );
         }
@@ -487,7 +487,7 @@ pub fn text(setup: Setup, runs: &[Run]) -> String {
 
 /// Formats every run and number of views as CSV, for plots.
 pub fn csv(runs: &[Run]) -> String {
-    let mut text = "camera,run,kind,views,off_px,off_near_px,says_px,expected_px\n".to_owned();
+    let mut text = "camera,run,kind,views,off_px,error_near_px,stated_px,expected_px\n".to_owned();
     let mut run_of: (&str, usize) = ("", 0);
     for run in runs {
         run_of = (run.subject, if run_of.0 == run.subject { run_of.1 + 1 } else { 0 });
@@ -496,10 +496,10 @@ pub fn csv(runs: &[Run]) -> String {
         {
             for worth in worths {
                 let expected = worth.expected_px.map_or(String::new(), |px| format!("{px:.6}"));
-                let Worth { views, off_px, off_near_px, said_px, .. } = worth;
+                let Worth { views, off_px, error_near_px, said_px, .. } = worth;
                 let _ = writeln!(
                     text,
-                    "{},{},{kind},{views},{off_px:.6},{off_near_px:.6},{said_px:.6},{expected}",
+                    "{},{},{kind},{views},{off_px:.6},{error_near_px:.6},{said_px:.6},{expected}",
                     run.subject, run_of.1
                 );
             }

@@ -103,9 +103,9 @@ pub struct Outcome {
     /// See `focal`.
     pub centre_px: f64,
     /// RMS errors of the cameras' positions and orientations relative to the first camera, mm and rad.
-    pub place_mm: f64,
-    /// See `place_mm`.
-    pub turn_rad: f64,
+    pub position_mm: f64,
+    /// See `position_mm`.
+    pub rotation_rad: f64,
 }
 
 /// Reason why an experiment failed.
@@ -301,7 +301,7 @@ impl Outcome {
             let place = camera.camera_from_rig.inverse().translation - truth.inverse().translation;
             (place.length(), camera.camera_from_rig.rotation.angle_between(truth.rotation))
         });
-        let (places, turns): (Vec<f64>, Vec<f64>) = off.unzip();
+        let (places, rotations): (Vec<f64>, Vec<f64>) = off.unzip();
         Self {
             object,
             refined,
@@ -311,8 +311,8 @@ impl Outcome {
             corners: found.corner_count(),
             focal: rms(focal.collect()),
             centre_px: rms(centre.collect()),
-            place_mm: rms(places),
-            turn_rad: rms(turns),
+            position_mm: rms(places),
+            rotation_rad: rms(rotations),
         }
     }
 }
@@ -333,8 +333,8 @@ pub fn text(outcomes: &[Outcome]) -> String {
             outcome.rms_px,
             100.0 * outcome.focal,
             outcome.centre_px,
-            outcome.place_mm,
-            outcome.turn_rad.to_degrees(),
+            outcome.position_mm,
+            outcome.rotation_rad.to_degrees(),
             match outcome.left_out {
                 0 => String::new(),
                 n => format!("  ({n} excluded)"),

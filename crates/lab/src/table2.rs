@@ -18,7 +18,7 @@ const SIZE: [u32; 2] = [10, 11];
 const EDGE_MM: f64 = 20.0;
 
 /// Minimum number of images of the board: three for each half, enough for a calibration.
-const LEAST_VIEWS: usize = 6;
+const MIN_VIEWS: usize = 6;
 
 /// A row of the table: RMS reprojection errors per axis, px.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,7 +40,7 @@ pub struct Row {
 pub enum Table2Error {
     /// Too few images of the board.
     #[error(
-        "{found} of {all} images show the whole untagged board of {} × {} corners, but {LEAST_VIEWS} are needed: \
+        "{found} of {all} images show the whole untagged board of {} × {} corners, but {MIN_VIEWS} are needed: \
          give the folder of the paper's photographs", SIZE[0], SIZE[1]
     )]
     TooFew {
@@ -66,7 +66,7 @@ pub fn run(images: &[impl AsRef<Path> + Sync]) -> Result<Vec<Row>, Table2Error> 
     let mut rows = Vec::new();
     for refinement in [Refinement::Polynomial, Refinement::Model] {
         let views = detect(images, refinement)?;
-        if views.len() < LEAST_VIEWS {
+        if views.len() < MIN_VIEWS {
             return Err(Table2Error::TooFew { found: views.len(), all: images.len() });
         }
         let (first, second) = views.split_at(views.len() / 2);
@@ -118,7 +118,7 @@ fn detect(
     let found = found.collect::<Result<Vec<_>, ImageError>>()?;
     let mut views = views(&found, &reference())?.views;
     // If only a part of the board is visible, the identity of its corners is ambiguous.
-    views.retain(|view| reference().is_sure_of(view));
+    views.retain(|view| reference().has_certain_labels(view));
     Ok(views)
 }
 

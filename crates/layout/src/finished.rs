@@ -70,7 +70,7 @@ fn add_contour(sheet: &mut SheetLayout, margin_mm: f64) {
     if sheet.lines.iter().any(|line| line.kind == LineKind::Cut) {
         return;
     }
-    let inset = margin_mm.max(super::placing::arrangement::LEAST_MARGIN_MM) / 2.0;
+    let inset = margin_mm.max(super::placing::arrangement::MIN_MARGIN_MM) / 2.0;
     let (right, upper) = (sheet.width_mm - inset, sheet.height_mm - inset);
     add_outline(sheet, rectangle([inset, inset, right, upper]));
 }

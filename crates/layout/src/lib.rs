@@ -26,7 +26,7 @@ mod sheet;
 pub mod synth;
 
 pub use finish::Finish;
-pub use marks::{Label, Logo, LogoPlacement, MOST_LOGO_BYTES};
+pub use marks::{Label, Logo, LogoPlacement, MAX_LOGO_BYTES};
 pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec, SolidSheets};
 pub use placing::{CHECK_BAR_STROKE_MM, Hinge, edge_numbers, edge_text, tag_range, upright_number};
 pub use planning::{Proposal, Reach, Situation, Unsuited};

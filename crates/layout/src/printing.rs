@@ -236,7 +236,7 @@ fn poster(
 /// millimetres that fits. If nothing fits, building the board reports the error.
 pub fn usual_edge_mm(spec: &BoardSpec, paper: &PaperSpec) -> f64 {
     let fitting = paper.size.as_ref().and_then(|_| largest_edge_mm(spec, paper));
-    fitting.unwrap_or(BoardSpec::USUAL_EDGE_MM)
+    fitting.unwrap_or(BoardSpec::DEFAULT_EDGE_MM)
 }
 
 /// Returns the largest edge in whole millimetres with which a board fits on paper, or `None` if 5 mm does not fit.

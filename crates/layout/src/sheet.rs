@@ -59,10 +59,10 @@ pub struct SheetPage {
     /// Page number, counted from 1, row by row from the upper left.
     pub label: String,
     /// Left, lower, right and upper edge of the window on the page, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
+    #[serde(deserialize_with = "quantity::position_mm::de")]
     pub window_mm: [f64; 4],
     /// Page position of the lower-left corner of the sheet, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
+    #[serde(deserialize_with = "quantity::position_mm::de")]
     pub sheet_at_mm: DVec2,
     /// Size of the page, and the marks around the window.
     pub marks: SheetLayout,
@@ -78,7 +78,7 @@ pub struct Placement {
     #[serde(deserialize_with = "quantity::angle_rad::de")]
     pub angle_rad: f64,
     /// Page position of the panel's origin, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
+    #[serde(deserialize_with = "quantity::position_mm::de")]
     pub origin_mm: DVec2,
 }
 
@@ -104,10 +104,10 @@ pub struct SheetLine {
     /// Its purpose.
     pub kind: LineKind,
     /// One end on the page, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
+    #[serde(deserialize_with = "quantity::position_mm::de")]
     pub from_mm: DVec2,
     /// The other end on the page, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
+    #[serde(deserialize_with = "quantity::position_mm::de")]
     pub to_mm: DVec2,
     /// Line width, mm.
     #[serde(deserialize_with = "quantity::length_mm::de")]
@@ -154,10 +154,10 @@ impl LineKind {
 #[serde(deny_unknown_fields)]
 pub struct CheckBar {
     /// One end on the page, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
+    #[serde(deserialize_with = "quantity::position_mm::de")]
     pub from_mm: DVec2,
     /// The other end on the page, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
+    #[serde(deserialize_with = "quantity::position_mm::de")]
     pub to_mm: DVec2,
 }
 
@@ -176,7 +176,7 @@ pub struct SheetText {
     /// Content of the text.
     pub text: Label,
     /// Page position of the left end of the baseline, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
+    #[serde(deserialize_with = "quantity::position_mm::de")]
     pub at_mm: DVec2,
     /// Counter-clockwise rotation of the baseline, radians.
     #[serde(deserialize_with = "quantity::angle_rad::de")]

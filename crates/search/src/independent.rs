@@ -39,7 +39,7 @@ impl ConflictGraph {
         pool: &[u64],
         halt: impl Fn() -> bool + Sync + Send,
     ) -> Self {
-        let turned: Vec<u64> = pool.iter().flat_map(|&w| screen.words().turns(w)).collect();
+        let turned: Vec<u64> = pool.iter().flat_map(|&w| screen.words().rotations(w)).collect();
         Self::new(pool.len(), |i| {
             if halt() {
                 return Vec::new();

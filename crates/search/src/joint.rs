@@ -126,7 +126,7 @@ impl Joint<'_> {
             true => 1 << arrangement.bit_map(dimension)[bits as usize - 1],
             false => 0,
         };
-        let turned: Vec<u64> = codes.iter().flat_map(|&code| words.turns(code)).collect();
+        let turned: Vec<u64> = codes.iter().flat_map(|&code| words.rotations(code)).collect();
         let passes = |word: u64| self.screen.admits(word) || self.screen.admits(word ^ centre);
         let fits =
             |word: &u64| self.screen.admits(*word) && self.screen.is_apart_from(*word, &turned);

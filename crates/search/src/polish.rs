@@ -90,7 +90,7 @@ fn candidates(
         if halt() {
             return None;
         }
-        for word in words.turns(code) {
+        for word in words.rotations(code) {
             count_ball(&mut conflicts, word as usize, bits, screen.distance() - 1);
             for difference in &hidden {
                 let count = &mut conflicts[(word ^ difference) as usize];

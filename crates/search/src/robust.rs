@@ -8,7 +8,7 @@ use deltille_core::family::algebra::AlgebraicConstruction;
 use deltille_core::family::{FamilyError, Screen};
 
 /// Maximum number of words considered: their conflicts must fit in memory.
-const MOST_WORDS: usize = 30_000;
+const MAX_WORDS: usize = 30_000;
 
 /// Number of moves of the local search.
 const STEPS: u64 = 4_000_000;
@@ -25,7 +25,7 @@ pub(crate) fn with_the_most_codes(
         return Ok((codes, construction));
     }
     let words = construction.words_of_the_union(screen)?;
-    if words.len() == codes.len() || words.len() > MOST_WORDS {
+    if words.len() == codes.len() || words.len() > MAX_WORDS {
         return Ok((codes, construction));
     }
     let mut pool = codes.clone();
@@ -79,7 +79,7 @@ mod tests {
             }
             for family in families {
                 let certificate = certify(&family);
-                assert!(certificate.holds(), "{robust}: {:?}", certificate.failures);
+                assert!(certificate.is_valid(), "{robust}: {:?}", certificate.failures);
                 assert!(certificate.robust[0].distance >= family.rules().robust[0].distance);
                 assert!(family.len() >= least, "{robust}: {}", family.len());
                 assert_eq!(Family::from_json(&family.to_json()).unwrap(), family);

@@ -44,7 +44,7 @@ fn families_with_free_cells_decode_without_them() {
         "progress counts only codes that were found"
     );
     let (free, certificate) = (family.free_cells(), certify(&family));
-    assert!(certificate.holds(), "{:?}", certificate.failures);
+    assert!(certificate.is_valid(), "{:?}", certificate.failures);
     let of_all = bounds::bounds(family.kind(), dimension, 5).linear_programming;
     assert!(family.bounds().linear_programming < of_all, "fewer used cells distinguish fewer tags");
     assert!(family.len() >= 30 && family.codes().iter().all(|code| code & free == 0));
@@ -60,7 +60,7 @@ fn families_with_free_cells_decode_without_them() {
     for (errors, (coins, rate)) in (0..).zip(coins.into_iter().zip(rates)) {
         let taken: Vec<u64> =
             (0..1u64 << 16).filter(|&word| decoder.decode(word, errors).is_some()).collect();
-        let sum: f64 = taken.iter().map(|&word| natural.chance(word)).sum();
+        let sum: f64 = taken.iter().map(|&word| natural.probability(word)).sum();
         assert!((rate - sum).abs() < 1e-9 * sum, "{errors}: {rate}, {sum}");
         assert!((coins * 65536.0 - taken.len() as f64).abs() < 1e-6);
     }
@@ -73,7 +73,7 @@ fn ranks_meet_every_orbit_once() {
     let orbits: HashSet<u64> =
         (0..ranked.len()).map(|r| space.canonical(ranked.word(r).unwrap())).collect();
     assert_eq!((ranked.len(), orbits.len()), (1360, 1360));
-    assert!(orbits.iter().all(|&w| code.contains(w) && space.turn(w) != w));
+    assert!(orbits.iter().all(|&w| code.contains(w) && space.rotate(w) != w));
     assert_eq!(ranked.word(ranked.len()), None);
     let large = Ranked::new(residue::space(47), &residue::extended(47)).unwrap();
     assert_eq!(large.len(), 5_592_320);

@@ -70,19 +70,19 @@ impl<'a> Verifier<'a> {
 
     /// Sets the guard for third-party code on artifacts in memory; the default is [`Guard::Here`]. Use
     /// [`Guard::Timed`] where threads are available and files are not trusted.
-    pub fn guarded_by(self, guard: Guard) -> Self {
+    pub fn with_guard(self, guard: Guard) -> Self {
         Self { guard, ..self }
     }
 
     /// Sets a flag that is checked before each page: once it is set, [`verify`](Self::verify) returns
     /// [`VerifyError::Cancelled`].
-    pub fn stopped_by(self, flag: &'a AtomicBool) -> Self {
+    pub fn cancelled_by(self, flag: &'a AtomicBool) -> Self {
         Self { cancel: Some(flag), ..self }
     }
 
     /// Sets a callback that receives the progress after each page of a document and each face of a mesh. Faces are
     /// compared on several threads.
-    pub fn telling(self, progress: &'a (dyn Fn(Progress) + Sync)) -> Self {
+    pub fn with_progress(self, progress: &'a (dyn Fn(Progress) + Sync)) -> Self {
         Self { progress: Some(progress), ..self }
     }
 

@@ -11,7 +11,7 @@ use super::dice::{Dice, noise};
 const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 /// Maximum number of pixel bytes that are decompressed for mutation.
-const MOST_BYTES: u64 = 4 << 20;
+const MAX_BYTES: u64 = 4 << 20;
 
 /// Mutates one thing; `None` if the bytes are not a PNG.
 pub fn change(bytes: &[u8], dice: &mut Dice) -> Option<Vec<u8>> {
@@ -32,7 +32,7 @@ pub fn change(bytes: &[u8], dice: &mut Dice) -> Option<Vec<u8>> {
         5 if &chunks[at].0 == b"IDAT" => {
             let mut pixels = Vec::new();
             let packed = ZlibDecoder::new(&chunks[at].1[..]);
-            packed.take(MOST_BYTES).read_to_end(&mut pixels).ok()?;
+            packed.take(MAX_BYTES).read_to_end(&mut pixels).ok()?;
             let mut packed = ZlibEncoder::new(Vec::new(), Compression::fast());
             packed.write_all(&noise(&pixels, dice)).ok()?;
             chunks[at].1 = packed.finish().ok()?;

@@ -94,7 +94,7 @@ impl CalibratedCamera {
     /// Names of the F estimated parameters.
     #[getter]
     fn found(&self) -> Vec<String> {
-        self.estimate().found().map(str::to_owned).collect()
+        self.estimate().estimated_parameters().map(str::to_owned).collect()
     }
 
     /// Covariance of the estimated parameters, F × F, float64, from the noise of the corners.
@@ -283,7 +283,7 @@ impl CalibratedCamera {
             serde_json::json!({
                 "model": tried.model.to_string(), "parameters": tried.parameters,
                 "held_out_px": tried.held_out_px, "is_stable": tried.is_stable,
-                "holds": tried.holds, "chosen": tried.chosen,
+                "adequate": tried.is_adequate, "chosen": tried.chosen,
             })
         };
         record(py, &tried.iter().map(one).collect::<Vec<_>>())

@@ -400,7 +400,7 @@ fn text_of(solved: &Solved, residuals: bool) -> PyResult<String> {
         let what = "residuals: the loaded file contains none; save with residuals=True right after calibrating";
         return Err(errors::calibration(what.to_owned()));
     }
-    let listed = if residuals { Residuals::Listed } else { Residuals::LeftOut };
+    let listed = if residuals { Residuals::Listed } else { Residuals::Omitted };
     Ok(solved.json(listed))
 }
 

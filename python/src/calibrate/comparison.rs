@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use deltille::calibrate::{
-    self, CameraEstimate, CameraMotion, Diagnosis, Estimate, Reference, Region, Words,
+    self, CameraEstimate, CameraMotion, Diagnosis, Estimate, Messages, Reference, Region,
     compare_boards, views,
 };
 use deltille::export::sheet::Sheet;
@@ -118,8 +118,8 @@ impl Comparison {
 
     /// Probability (p-value) that noise alone makes them differ as much, if the camera is unchanged.
     #[getter]
-    fn chance(&self) -> Option<f64> {
-        self.found.chance
+    fn p_value(&self) -> Option<f64> {
+        self.found.p_value
     }
 
     /// Why the significance of the difference is not known, as a sentence; ``None`` if it is.
@@ -198,20 +198,20 @@ impl Motion {
 
     /// Rotation about its axes, 3, float64, rad.
     #[getter]
-    fn turn_rad<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        arrays::column(py, self.0.turn_rad.to_array())
+    fn rotation_rad<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        arrays::column(py, self.0.rotation_rad.to_array())
     }
 
     /// Translation along its axes, 3, float64, mm.
     #[getter]
-    fn moved_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        arrays::column(py, self.0.moved_mm.to_array())
+    fn translation_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        arrays::column(py, self.0.translation_mm.to_array())
     }
 
     /// Probability (p-value) that noise alone makes as large a motion; ``None`` if uncertainties are not known.
     #[getter]
-    fn chance(&self) -> Option<f64> {
-        self.0.chance
+    fn p_value(&self) -> Option<f64> {
+        self.0.p_value
     }
 
     /// Why the significance of the motion is not known, as a sentence; ``None`` if it is.
@@ -227,8 +227,8 @@ impl Motion {
     }
 
     fn __repr__(&self) -> String {
-        let CameraMotion { from, to, turn_rad, moved_mm, .. } = &self.0;
-        let (turn, moved) = (turn_rad.length(), moved_mm.length());
+        let CameraMotion { from, to, rotation_rad, translation_mm, .. } = &self.0;
+        let (turn, moved) = (rotation_rad.length(), translation_mm.length());
         let significance = significance(self.0.is_significant());
         format!("<Motion of {to} from {from}: {turn:.6} rad, {moved:.4} mm{significance}>")
     }
@@ -523,8 +523,9 @@ impl Asked {
         match calibration.located(found).raise(errors::calibration)? {
             Err(why) => Ok(nowhere(errors::one_line(&why))),
             Ok(estimate) => {
-                let words = Words::new(&estimate, None);
-                let is_of_picture = |said: &&Diagnosis| !matches!(said, Diagnosis::LensEnds { .. });
+                let words = Messages::new(&estimate, None);
+                let is_of_picture =
+                    |said: &&Diagnosis| !matches!(said, Diagnosis::NonMonotonicLens { .. });
                 let said = estimate.diagnose();
                 let said = said.iter().filter(is_of_picture).map(|said| words.sentence(said));
                 let warnings = said.collect();

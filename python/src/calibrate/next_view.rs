@@ -32,7 +32,7 @@ impl NextView {
 
     /// Instructions for the user; left and right are those of the image.
     #[getter]
-    fn words(&self) -> String {
+    fn description(&self) -> String {
         self.next.to_string()
     }
 
@@ -51,7 +51,7 @@ impl NextView {
 
     /// An arrow from the centre of the board towards its upper side, 2 × 2, float64, px; ``None`` if it is outside the lens.
     #[getter]
-    fn upwards<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
+    fn up<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
         self.next.upwards.map(|ends| arrays::rows(py, ends.iter().map(|at| at.to_array())))
     }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use deltille::calibrate::{
     Calibration, CalibrationError, Candidate, Diagnosis, Estimate, Excluded, Intrinsics, Loss,
-    Model, PanelPlace, Reference, UntaggedGrid, View, Weights, Words, views,
+    Messages, Model, PanelPrior, Reference, UntaggedGrid, View, Weights, views,
 };
 use deltille::export::calibration::{Print, Residuals};
 use deltille::export::sheet::Sheet;
@@ -249,7 +249,7 @@ pub struct Solved {
     pub diagnoses: Vec<Diagnosis>,
     pub print: Print,
     /// Poses of the panels in the target's file.
-    pub stated: Vec<PanelPlace>,
+    pub stated: Vec<PanelPrior>,
     /// The models compared, by camera.
     pub models: Vec<Vec<Candidate>>,
     pub targets: Vec<Printing>,
@@ -325,9 +325,9 @@ impl Solved {
                 .map(|record| (record.clone(), is_failure(&record)))
                 .collect();
         }
-        let file = serde_json::from_str(&self.json(Residuals::LeftOut)).unwrap_or_default();
+        let file = serde_json::from_str(&self.json(Residuals::Omitted)).unwrap_or_default();
         let records = records_of(&file);
-        let words = Words::new(&self.estimate, self.print.scale);
+        let words = Messages::new(&self.estimate, self.print.scale);
         let said = |diagnosis: &Diagnosis| {
             let text = words.sentence(diagnosis);
             let record = records.iter().find(|record| record["text"] == text.as_str());
@@ -391,7 +391,7 @@ pub fn solve(
             let mut of_camera: Vec<View> = shown.views;
             let name = is_named.then(|| camera.name.clone());
             left_out.extend(
-                shown.left_out.into_iter().map(|(_, out)| Excluded { camera: name.clone(), ..out }),
+                shown.excluded.into_iter().map(|(_, out)| Excluded { camera: name.clone(), ..out }),
             );
             let target = seen.targets().first();
             how.sheet.put_on(target, &mut of_camera).raise(errors::calibration)?;
@@ -417,7 +417,7 @@ pub fn solve(
             .refine_panels(how.refine_target)
             .distances_mm(how.distances_mm)
             .hold_out(how.hold_out)
-            .stopped_by(stop.clone());
+            .cancelled_by(stop.clone());
         if let Some(mm) = how.board_accuracy_mm {
             calibration = calibration.board_accuracy_mm(Some(mm));
         }
@@ -438,9 +438,9 @@ pub fn solve(
         Ok::<_, CalibrationError>((estimate, diagnoses, models))
     })?;
     let (mut estimate, diagnoses, models) = solved.raise(errors::calibration)?;
-    let foreign = diagnoses.iter().find(|said| matches!(said, Diagnosis::ForeignCamera { .. }));
+    let foreign = diagnoses.iter().find(|said| matches!(said, Diagnosis::WrongCamera { .. }));
     if let Some(foreign) = foreign {
-        let text = Words::new(&estimate, print.scale).sentence(foreign);
+        let text = Messages::new(&estimate, print.scale).sentence(foreign);
         return Err(raised::CalibrationError::new_err(text));
     }
     if estimate.frames.is_empty() {

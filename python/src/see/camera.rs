@@ -52,7 +52,7 @@ const FOCAL: Range = focal_px::RANGE;
 /// Returns the lens of a model in camera files, and its maximum number of coefficients.
 fn lens_of(model: &str) -> (&str, usize) {
     match Model::named().find(|(name, of_name)| *name == model && of_name.kind().name() != *name) {
-        Some((_, of_name)) => (of_name.kind().name(), of_name.found()),
+        Some((_, of_name)) => (of_name.kind().name(), of_name.parameter_count()),
         None => (model, usize::MAX),
     }
 }

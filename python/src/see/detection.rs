@@ -7,7 +7,7 @@ use std::sync::Arc;
 use deltille::calibrate::Reference;
 use deltille::detect::{self, GridCorner};
 use deltille::export::named::named;
-use deltille::export::tables::{Picture, folder};
+use deltille::export::tables::{ImageRecord, folder};
 use deltille::export::{DETECTION_FORMATS, detection};
 use deltille::limits::Limits;
 use deltille::targets;
@@ -163,7 +163,7 @@ impl Detection {
         });
         let place = |corner: &GridCorner| {
             let index = corner.id.and_then(|id| ids.get(&id));
-            let place = panel.zip(index).map(|(panel, &i)| panel.place_mm(&panel.corners[i]));
+            let place = panel.zip(index).map(|(panel, &i)| panel.position_mm(&panel.corners[i]));
             place.map_or([f64::NAN; 3], |place| place.to_array())
         };
         grid.corners.iter().map(place).collect()
@@ -411,14 +411,14 @@ impl Detection {
         self.found.reasons.iter().cloned().map(Reason).collect()
     }
 
-    /// Estimate of the camera's tone curve: ``kappa``, ``kappa_deviation`` (1σ), ``black``, ``white``, ``used`` and
+    /// Estimate of the camera's tone curve: ``kappa``, ``kappa_sd`` (1σ), ``black``, ``white``, ``used`` and
     /// others; ``None`` if it was not estimated.
     #[getter]
     fn tone<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.found.tone.map(|tone| record(py, &tone)).transpose()
     }
 
-    /// Estimate of the ink spread of the print: ``um``, ``um_deviation`` (1σ), ``edges``, ``used`` and others; ``None`` if
+    /// Estimate of the ink spread of the print: ``um``, ``um_sd`` (1σ), ``edges``, ``used`` and others; ``None`` if
     /// it was not estimated.
     #[getter]
     fn ink<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
@@ -519,7 +519,7 @@ pub fn _tables(
         }
     }
     let targets = targets.map(|targets| targets.0).unwrap_or_default();
-    let row = |picture: Picture| match picture.found {
+    let row = |picture: ImageRecord| match picture.found {
         Ok(found) => {
             let found = Detection::of(found, targets.clone(), assume_target)?;
             Ok((picture.image, Some(found), None))
@@ -527,7 +527,7 @@ pub fn _tables(
         Err(why) => Ok((picture.image, None, Some(why))),
     };
     let read = folder::read(&files, &Limits::default()).raise_of_file(&first, errors::file)?;
-    read.pictures.into_iter().map(row).collect()
+    read.images.into_iter().map(row).collect()
 }
 
 /// Results of `detect_many`, without the images that could not be read.

@@ -2,7 +2,7 @@
 
 use deltille::camera;
 use deltille::glam::{DMat3, DQuat, DVec3};
-use deltille_core::quantity::{angle_rad, place_mm};
+use deltille_core::quantity::{angle_rad, position_mm};
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -40,8 +40,9 @@ impl Pose {
         let rvec = rvec.map_or(Ok([0.0; 3]), |rvec| {
             vector("rvec", rvec, angle_rad::RANGE, errors::argument)
         })?;
-        let tvec = tvec
-            .map_or(Ok([0.0; 3]), |tvec| vector("tvec", tvec, place_mm::RANGE, errors::argument))?;
+        let tvec = tvec.map_or(Ok([0.0; 3]), |tvec| {
+            vector("tvec", tvec, position_mm::RANGE, errors::argument)
+        })?;
         let rotation = DQuat::from_scaled_axis(rvec.into());
         Ok(Self(camera::Pose { rotation, translation: tvec.into() }))
     }
@@ -65,8 +66,8 @@ impl Pose {
         at: &Bound<'_, PyAny>,
         up: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let up = up.map(|up| vector("up", up, place_mm::RANGE, errors::argument)).transpose()?;
-        let place = |name: &str, place| vector(name, place, place_mm::RANGE, errors::argument);
+        let up = up.map(|up| vector("up", up, position_mm::RANGE, errors::argument)).transpose()?;
+        let place = |name: &str, place| vector(name, place, position_mm::RANGE, errors::argument);
         Self::looking_at(place("eye", eye)?, place("at", at)?, up)
     }
 
@@ -87,7 +88,8 @@ impl Pose {
         let ([x, y, z] | [x, y, z, _]) = rows.as_slice() else {
             return wrong("expected 4 × 4 or 3 × 4");
         };
-        let outside = rows.iter().flatten().find_map(|&number| place_mm::RANGE.check(number).err());
+        let outside =
+            rows.iter().flatten().find_map(|&number| position_mm::RANGE.check(number).err());
         if let Some(outside) = outside {
             return wrong(&outside.to_string());
         }

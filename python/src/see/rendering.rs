@@ -6,7 +6,7 @@ use deltille::export::truth;
 use deltille::glam::DVec3;
 use deltille::limits::Limits;
 use deltille::synth::{Light, TruthCorner, scene_of_target};
-use deltille_core::quantity::{blur_px, light_gradient, of_full_scale, place_mm};
+use deltille_core::quantity::{blur_px, light_gradient, of_full_scale, position_mm};
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -205,7 +205,7 @@ pub fn render<'py>(
         .background(grey("background", background)?)
         .gradient(gradient.unwrap_or([0.0; 2]).into())
         .seed(whole("seed", seed, errors::target)?);
-    let place = |name: &str, place| vector(name, place, place_mm::RANGE, errors::target);
+    let place = |name: &str, place| vector(name, place, position_mm::RANGE, errors::target);
     let look_at = look_at.map(|at| place("look_at", at)).transpose()?;
     let up = up.map(|up| place("up", up)).transpose()?;
     let pose = match (pose, eye) {

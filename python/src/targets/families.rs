@@ -269,7 +269,7 @@ impl Family {
         };
         Ok((
             numbers(|found| found.id.into()),
-            numbers(|found| found.turns.into()),
+            numbers(|found| found.rotations.into()),
             numbers(|found| found.errors.into()),
         ))
     }
@@ -317,7 +317,7 @@ pub fn kind(kind: GridKind) -> &'static str {
 ///     Amount of work instead of a duration; gives the same codes on every machine.
 /// seed : int, optional
 ///     Seed of the random choices.
-/// from_nothing : bool, optional
+/// from_scratch : bool, optional
 ///     Start from scratch instead of from the best known family.
 /// callback : callable, optional
 ///     Called regularly with the fraction done (0 to 1) and the number of codes so far. If it returns ``False``, the search
@@ -327,14 +327,14 @@ pub fn kind(kind: GridKind) -> &'static str {
 /// -------
 /// Family
 #[pyfunction]
-#[pyo3(signature = (name, *, seconds = 60.0, work = None, seed = 0, from_nothing = false, callback = None))]
+#[pyo3(signature = (name, *, seconds = 60.0, work = None, seed = 0, from_scratch = false, callback = None))]
 pub fn search_family(
     py: Python<'_>,
     name: &str,
     seconds: f64,
     work: Option<i64>,
     seed: i64,
-    from_nothing: bool,
+    from_scratch: bool,
     callback: Option<Py<PyAny>>,
 ) -> PyResult<Family> {
     let wrong = |what: &str| raised::FamilyError::new_err(format!("{name}: {what}"));
@@ -356,7 +356,7 @@ pub fn search_family(
     let raised_by_callback: Arc<Mutex<Option<PyErr>>> = Arc::default();
     let error = raised_by_callback.clone();
     let found = interruptible(py, move |stop| {
-        let start = if from_nothing { None } else { search.start() };
+        let start = if from_scratch { None } else { search.start() };
         let report = |progress: Progress| {
             if let Some(callback) = &callback {
                 report_progress(callback, progress, stop, &error);

@@ -127,7 +127,7 @@ impl Target {
     /// Positions of all corners in the target's frame, N × 3, float64, mm: measured if known, otherwise nominal.
     #[getter]
     fn corners<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        arrays::rows(py, self.all().map(|(panel, corner)| panel.place_mm(corner).to_array()))
+        arrays::rows(py, self.all().map(|(panel, corner)| panel.position_mm(corner).to_array()))
     }
 
     /// Ids of the corners, N, int64.

@@ -33,7 +33,7 @@ impl Verdict {
         stop: &AtomicBool,
     ) -> PyResult<Self> {
         let verifier = Verifier::new(printing);
-        let verifier = verifier.raise(errors::verify)?.stopped_by(stop);
+        let verifier = verifier.raise(errors::verify)?.cancelled_by(stop);
         let path = Path::new(&name);
         let verdict = match files {
             None => verifier.verify_path(path),

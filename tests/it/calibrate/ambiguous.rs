@@ -144,7 +144,7 @@ fn the_pose_of_an_upside_down_camera_is_right() {
         assert_eq!(rig.found.frames.len(), boards.len());
         let rotation = rig.said[1].unwrap();
         assert_eq!((rotation.degrees, rotation.frames, rotation.of), (180, 16, 16));
-        assert!(rotation.is_sure);
+        assert!(rotation.is_confirmed);
         assert!(rig.found.diagnose().iter().any(|s| matches!(s, Diagnosis::LabelsRotated { .. })));
     }
 }
@@ -164,7 +164,7 @@ fn labels_that_change_between_frames_are_unified() {
         let rig = Rig::of(&checkerboard(rows, cols), rolls, &boards, Model::Radtan, 7);
         assert!(rig.off_mm() < 8.0, "{rows} × {cols}: {} mm", rig.off_mm());
         assert_eq!(rig.found.frames.len(), boards.len());
-        let some = rig.said.iter().flatten().filter(|said| said.frames > 0 && said.is_sure);
+        let some = rig.said.iter().flatten().filter(|said| said.frames > 0 && said.is_confirmed);
         assert!(some.count() > 0, "{:?}", rig.said);
     }
 }
@@ -188,7 +188,7 @@ fn undecidable_labels_are_reported() {
     let camera = Camera::pinhole(1280, 960, 1.0);
     let rig = Rig::of(&checkerboard(4, 6), &[0.0, 0.1], &boards, camera, 1);
     let said = rig.said[1].unwrap();
-    assert_eq!((said.frames, said.is_sure), (0, false));
+    assert_eq!((said.frames, said.is_confirmed), (0, false));
     assert!(rig.off_mm() < 8.0);
 }
 

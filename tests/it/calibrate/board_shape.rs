@@ -1,7 +1,7 @@
 //! Estimation of the shape of a board's sheet, which is significant only for a bent sheet.
 
 use deltille::calibrate::{
-    BoardShape, Calibration, CalibrationError, Diagnosis, Estimate, Instead, LackOfFit, Model,
+    Alternative, BoardShape, Calibration, CalibrationError, Diagnosis, Estimate, LackOfFit, Model,
     Observation, PanelRef, Reference, Remedy, Sighting, UntaggedGrid, View,
 };
 use deltille::camera::{Camera, Pose};
@@ -145,7 +145,7 @@ fn a_rig_estimates_the_shape_of_a_sheet() {
     // Without the shape the board is blamed.
     let flat = both.solve().unwrap();
     let said = both.explain(&flat);
-    let is_of_shape = |said: &Diagnosis| matches!(said, Diagnosis::Remedied { remedy, .. } if remedy.instead == Instead::Shape);
+    let is_of_shape = |said: &Diagnosis| matches!(said, Diagnosis::Remedied { remedy, .. } if remedy.alternative == Alternative::Shape);
     assert!(said.len() == 1 && said.iter().all(is_of_shape), "{said:?}");
 }
 
@@ -160,7 +160,8 @@ fn a_bent_and_stretched_sheet_is_estimated() {
     assert!((0.05..0.5).contains(&rms_mm), "{rms_mm}");
     assert_eq!(found.lack_of_fit, []);
     let said = plain.explain(&flat);
-    let [Diagnosis::Remedied { remedy: Remedy { instead: Instead::Shape, .. }, .. }] = said[..]
+    let [Diagnosis::Remedied { remedy: Remedy { alternative: Alternative::Shape, .. }, .. }] =
+        said[..]
     else {
         panic!("{said:?}")
     };

@@ -90,7 +90,7 @@ fn proposed_photographs_are_taken_until_they_suffice() {
         let next = json(&at.join("next.json"));
         assert_eq!(next["schema"], "deltille/next-view/1");
         assert_eq!(next["views"], index + 1, "{}", said(&output));
-        assert!(said(&output).contains(next["words"].as_str().unwrap()), "{}", said(&output));
+        assert!(said(&output).contains(next["description"].as_str().unwrap()), "{}", said(&output));
         let svg = std::fs::read_to_string(at.join("next.svg")).unwrap();
         let circles = svg.matches("<circle").count();
         assert_eq!(circles, next["corners"].as_array().unwrap().len());

@@ -2,7 +2,7 @@ mod ambiguous;
 mod board_shape;
 mod cameras;
 mod commands;
-mod gross_errors;
+mod common_outliers;
 mod guide;
 mod models;
 mod one_state;

@@ -1,7 +1,7 @@
 //! Calibration of simulated cameras with known parameters, and of views that determine no camera.
 
 use deltille::calibrate::{
-    Calibration, CalibrationError, Diagnosis, Estimate, Instead, Intrinsics, LackOfFit, Loss,
+    Alternative, Calibration, CalibrationError, Diagnosis, Estimate, Intrinsics, LackOfFit, Loss,
     Model, Observation, PanelRef, Remedy, Sighting, View, Weights,
 };
 use deltille::camera::{Camera, Pose};
@@ -141,14 +141,14 @@ fn chosen(models: &[Model], seeds: std::ops::Range<u64>) -> (usize, usize) {
 }
 
 #[test]
-fn the_model_chosen_holds_the_lens() {
+fn auto_selects_an_adequate_model_the_lens() {
     let models = [Model::Radtan, Model::KannalaBrandt(4), Model::Eucm];
     assert_eq!(chosen(&models, 0..2), (6, 6));
 }
 
 #[test]
 #[ignore = "200 lenses with nine models each"]
-fn the_model_chosen_holds_nearly_every_lens() {
+fn auto_selects_an_adequate_model_nearly_every_lens() {
     let (good, all) = chosen(&models().collect::<Vec<_>>(), 0..25);
     println!("{good} of {all}");
     assert!(good as f64 >= 0.95 * all as f64, "{good} of {all}");
@@ -379,10 +379,10 @@ fn the_remedy_of_a_wrong_model_is_found() {
             Diagnosis::Remedied { camera: 0, remedy } => Some(*remedy),
             _ => None,
         });
-        let [Remedy { instead, from_px, to_px, .. }] = remedies.collect::<Vec<_>>()[..] else {
+        let [Remedy { alternative, from_px, to_px, .. }] = remedies.collect::<Vec<_>>()[..] else {
             panic!("{model}: {said:?}")
         };
-        assert_eq!(instead, Instead::Model(better), "{model}");
+        assert_eq!(alternative, Alternative::Model(better), "{model}");
         assert!(to_px < 1.1 * NOISE_PX && from_px > to_px, "{model}: {from_px} {to_px}");
     }
 }

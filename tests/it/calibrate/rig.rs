@@ -1,8 +1,8 @@
 //! Rigs of simulated cameras: the estimates match the truth within the stated standard deviations.
 
 use deltille::calibrate::{
-    Calibration, CalibrationError, CameraViews, Diagnosis, Estimate, Instead, LackOfFit, Model,
-    Observation, PanelPlace, PanelRef, Sighting, View,
+    Alternative, Calibration, CalibrationError, CameraViews, Diagnosis, Estimate, LackOfFit, Model,
+    Observation, PanelPrior, PanelRef, Sighting, View,
 };
 use deltille::camera::{BrownConrady, Camera, Lens, Pose};
 use deltille::family::Family;
@@ -21,7 +21,7 @@ const PLACED_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
 
 /// Cameras around an icosahedron, and their views of it.
 struct Simulated {
-    stated: Vec<PanelPlace>,
+    stated: Vec<PanelPrior>,
     /// True poses of the panels.
     panels: Vec<Pose>,
     cameras: Vec<Camera>,
@@ -29,10 +29,13 @@ struct Simulated {
     views: Vec<CameraViews>,
 }
 
-fn small_pose(random: &mut ChaCha8Rng, turn_rad: f64, move_mm: f64) -> Pose {
+fn small_pose(random: &mut ChaCha8Rng, rotation_rad: f64, move_mm: f64) -> Pose {
     let normal = Normal::new(0.0, 1.0).unwrap();
     let mut vector = || DVec3::from_fn(|_| normal.sample(random));
-    Pose { rotation: DQuat::from_scaled_axis(vector() * turn_rad), translation: vector() * move_mm }
+    Pose {
+        rotation: DQuat::from_scaled_axis(vector() * rotation_rad),
+        translation: vector() * move_mm,
+    }
 }
 
 trait FromFn {
@@ -138,7 +141,7 @@ fn simulated(seed: u64, frames: usize) -> Simulated {
     Simulated { stated, panels, cameras, camera_from_rig, views }
 }
 
-fn calibration(views: &[CameraViews], panels: &[PanelPlace], refine: bool) -> Calibration {
+fn calibration(views: &[CameraViews], panels: &[PanelPrior], refine: bool) -> Calibration {
     let blank = Calibration::new(panels.iter().copied()).refine_panels(refine);
     views.iter().cloned().fold(blank, Calibration::with)
 }
@@ -221,7 +224,7 @@ fn a_refined_target_is_a_prior_of_the_next_calibration() {
     let alone = calibration(&few, &truth.stated, true).solve().unwrap();
     let with = calibration(&few, &first.panels, true).solve().unwrap();
     let deviation = |found: &Estimate| {
-        let of = |panel: &PanelPlace| panel.covariance.map(|c| c[3][3] + c[4][4] + c[5][5]);
+        let of = |panel: &PanelPrior| panel.covariance.map(|c| c[3][3] + c[4][4] + c[5][5]);
         let all: Vec<f64> = found.panels.iter().filter_map(of).collect();
         (all.iter().sum::<f64>() / all.len() as f64).sqrt()
     };
@@ -263,20 +266,20 @@ fn a_wrong_given_camera_is_named() {
     let said = said(&truth);
     let is_named = |said: &Diagnosis| {
         let Diagnosis::Remedied { camera, remedy } = said else { return false };
-        (*camera, remedy.instead) == (1, Instead::Camera)
+        (*camera, remedy.alternative) == (1, Alternative::Camera)
     };
     assert!(!said.is_empty() && said.iter().all(is_named), "{said:?}");
     // A different camera: nothing fits.
     truth.views[1].intrinsics = truth.cameras[2].clone().into();
     let error = calibration(&truth.views, &truth.really(), false).solve().unwrap_err();
     assert!(
-        matches!(&error, CalibrationError::ForeignCameras { cameras, .. } if cameras == "c1"),
+        matches!(&error, CalibrationError::WrongCameras { cameras, .. } if cameras == "c1"),
         "{error}"
     );
 }
 
 impl Simulated {
-    fn really(&self) -> Vec<PanelPlace> {
+    fn really(&self) -> Vec<PanelPrior> {
         self.panels.iter().map(|&target_from_panel| target_from_panel.into()).collect()
     }
 }

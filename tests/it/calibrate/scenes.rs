@@ -4,8 +4,8 @@
 use std::fs;
 
 use deltille::calibrate::{
-    Calibration, CalibrationError, Diagnosis, Estimate, Model, Observation, PanelPlace, PanelRef,
-    Reference, Sighting, TooPlain, View,
+    Calibration, CalibrationError, DegenerateMotion, Diagnosis, Estimate, Model, Observation,
+    PanelPrior, PanelRef, Reference, Sighting, View,
 };
 use deltille::camera::{BrownConrady, Camera, Lens, Pose};
 use deltille::export::saved;
@@ -118,7 +118,7 @@ impl Scene {
     }
 
     fn calibration(&self) -> Calibration {
-        let panels = |target: &Target| -> Vec<PanelPlace> {
+        let panels = |target: &Target| -> Vec<PanelPrior> {
             target.panels.iter().map(|panel| (&panel.pose).into()).collect()
         };
         let blank = match self.targets.as_slice() {
@@ -226,9 +226,10 @@ fn cameras_back_to_back_are_calibrated_with_boards_of_their_own() {
 
 #[test]
 fn insufficient_motion_is_named() {
-    for (reach, expected) in
-        [(DVec3::new(0.0, 0.4, 0.0), TooPlain::OneAxis), (DVec3::ZERO, TooPlain::NoTurn)]
-    {
+    for (reach, expected) in [
+        (DVec3::new(0.0, 0.4, 0.0), DegenerateMotion::OneAxis),
+        (DVec3::ZERO, DegenerateMotion::NoRotation),
+    ] {
         let mut scene = back_to_back(30, reach, 3);
         // Single cameras need tilted boards.
         let calibration = scene.views.iter().zip(&scene.cameras).enumerate().fold(
@@ -344,7 +345,7 @@ fn one_is_late(found: &Estimate) {
     let delays: Vec<i32> = found.cameras.iter().map(|camera| camera.delay).collect();
     assert_eq!(delays, LATE);
     let said = found.diagnose();
-    assert!(said.contains(&Diagnosis::Late { camera: 3, frames: 1 }), "{said:?}");
+    assert!(said.contains(&Diagnosis::DelayedCamera { camera: 3, frames: 1 }), "{said:?}");
 }
 
 #[test]
@@ -378,7 +379,7 @@ fn faces_with_wrong_ids_are_excluded() {
             0..2,
             |seed| with_wrong_faces(around(3, 30, seed), part, seed),
             |found| {
-                let is_named = |said: &Diagnosis| matches!(said, Diagnosis::GrossErrors(_));
+                let is_named = |said: &Diagnosis| matches!(said, Diagnosis::CommonOutliers(_));
                 assert!(found.diagnose().iter().any(is_named));
             },
         );

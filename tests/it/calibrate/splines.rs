@@ -60,7 +60,7 @@ fn a_spline_fits_an_arbitrary_lens_within_its_uncertainty() {
         assert!(held_out < 1.15 * NOISE_PX, "{held_out} px");
         assert!(found.excluded.is_empty() && found.outlier_count() == 0);
         let camera = &found.cameras[0];
-        assert!(camera.ill_conditioned.is_empty() && camera.lens_end().is_none());
+        assert!(camera.ill_conditioned.is_empty() && camera.lens_limit().is_none());
         let [off, expected] = off(camera, &truth);
         println!("{seed}: {off:.4} px, {expected:.4} px expected");
         found_px += off * off;
@@ -171,7 +171,7 @@ fn a_spline_is_written_and_read_back() {
     let found = of(&views, "spline-3-10x8".parse::<Model>().unwrap()).solve().unwrap();
     let camera = &found.cameras[0];
     assert_eq!(Camera::from_yaml(&camera.camera.to_yaml()).unwrap(), camera.camera);
-    let residuals = calibration::Residuals::LeftOut;
+    let residuals = calibration::Residuals::Omitted;
     let text = calibration::write(&found, &[], calibration::Print::default(), residuals).unwrap();
     let read = &saved::read_without_target(&text).unwrap().cameras[0];
     assert_eq!((&read.camera, read.model), (&camera.camera, camera.model));

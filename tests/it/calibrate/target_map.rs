@@ -2,7 +2,7 @@
 //! none, and a measured target serves other calibrations.
 
 use deltille::calibrate::{
-    Calibration, CornerOffset, Estimate, Model, Observation, PanelPlace, PanelRef, Reference,
+    Calibration, CornerOffset, Estimate, Model, Observation, PanelPrior, PanelRef, Reference,
     Sighting, TargetMap, UntaggedGrid, View,
 };
 use deltille::camera::{Camera, Pose};
@@ -237,7 +237,7 @@ fn a_rig_measures_several_panels() {
     let right =
         Pose::looking_at(DVec3::new(60.0, 0.0, 0.0), DVec3::new(0.0, 0.0, 350.0), DVec3::NEG_Y);
     let of_camera = |pose: &Pose| views(&made, &offsets, pose, 30, 3000);
-    let rig = Calibration::new(planned.map(PanelPlace::from))
+    let rig = Calibration::new(planned.map(PanelPrior::from))
         .camera("left", of_camera(&Pose::IDENTITY), Model::Radtan)
         .camera("right", of_camera(&right), Model::Radtan)
         .refine_panels(true)

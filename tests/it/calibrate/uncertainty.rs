@@ -37,7 +37,7 @@ fn pairs(
         expected += both.expected_px.unwrap().powi(2);
         significant += usize::from(both.is_significant().unwrap());
         // The two numbers and the p-value are consistent.
-        assert!(both.rms_px > both.expected_px.unwrap() || both.chance.unwrap() > 0.2);
+        assert!(both.rms_px > both.expected_px.unwrap() || both.p_value.unwrap() > 0.2);
     }
     ((found / expected).sqrt(), significant)
 }
@@ -85,7 +85,7 @@ fn a_rotation_compensates_a_shifted_principal_point() {
     assert!(found.largest_px() < 0.006, "{}", found.largest_px());
     let [turn, _] = found.second_from_first.off(&Pose::IDENTITY);
     assert!((turn.length() - 0.5 / focal).abs() < 1e-2 * 0.5 / focal);
-    assert!(found.chance.is_none() && found.expected_px.is_none());
+    assert!(found.p_value.is_none() && found.expected_px.is_none());
     // At a distance, a translation explains it too.
     let near = Comparison::of(&first, &second, Some(500.0), Region::Image).unwrap();
     assert!(near.rms_px <= found.rms_px * (1.0 + 1e-6));
@@ -249,7 +249,7 @@ fn projection_uncertainties_are_read_back() {
         .distances_mm(vec![250.0, 4000.0])
         .solve()
         .unwrap();
-    let text = calibration::write(&found, &[], Print::default(), Residuals::LeftOut).unwrap();
+    let text = calibration::write(&found, &[], Print::default(), Residuals::Omitted).unwrap();
     let read = saved::read_without_target(&text).unwrap().cameras.remove(0);
     let camera = &found.cameras[0];
     let [one, other] = [camera, &read].map(CameraEstimate::uncertainty_maps);

@@ -281,7 +281,7 @@ fn a_stream_notes_that_files_would_have_other_corners() {
         notes.contains("note: --stream used a separate ink estimate for each image"),
         "{notes}"
     );
-    assert!(lines.lines().all(|line| line.contains("\"pictures\": 1}")));
+    assert!(lines.lines().all(|line| line.contains("\"images\": 1}")));
     assert!(!detect("a.png", "--stream").1.contains("note:"));
     assert!(!detect("*.png", "--stream --ink none").1.contains("note:"));
     assert!(!detect("*.png", "-o corners").1.contains("note:"));

@@ -80,7 +80,7 @@ fn all_images_of_one_print_have_the_same_ink() {
     let ink = |path: &PathBuf| detector.detect(&photograph::read(path).unwrap(), "photograph").ink;
     let inks: Vec<InkEstimate> = images.iter().step_by(3).filter_map(ink).collect();
     let all = InkEstimate::of_all(&inks).unwrap();
-    println!("{all}, from {} of {} pictures", all.pictures, images.len().div_ceil(3));
+    println!("{all}, from {} of {} pictures", all.images, images.len().div_ceil(3));
     assert!(all.used && inks.len() == images.len().div_ceil(3));
     assert!(
         inks.iter().all(|ink| ink.used && (ink.edges / all.edges - 1.0).abs() < 0.1),

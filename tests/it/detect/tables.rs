@@ -6,7 +6,7 @@ use std::path::Path;
 use deltille::camera::{BrownConrady, Camera, Lens, Pose};
 use deltille::detect::{Detection, Grid, GridCorner};
 use deltille::export::detection;
-use deltille::export::tables::{Contents, Picture, Reader, TableError, Writer};
+use deltille::export::tables::{Contents, ImageRecord, Reader, TableError, Writer};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
 use deltille::limits::Limits;
@@ -60,10 +60,10 @@ fn detections(target: &Target) -> Vec<Detection> {
         }
         let mut found = Detection::new(format!("{index}.png"), [1600, 1200], vec![grid, loose]);
         let ink = json!({
-            "edges": 0.1 / 3.0, "edges_deviation": 1e-3, "um": 12.0, "used": true, "pictures": 1,
+            "edges": 0.1 / 3.0, "edges_sd": 1e-3, "um": 12.0, "used": true, "images": 1,
         });
         let tone = json!({
-            "black": 0.1, "white": 0.9, "kappa": 1.0 / 3.0, "kappa_deviation": 0.01, "kappa_odd": -0.2, "used": true,
+            "black": 0.1, "white": 0.9, "kappa": 1.0 / 3.0, "kappa_sd": 0.01, "kappa_odd": -0.2, "used": true,
         });
         let reasons = json!([{ "kind": "no_tags", "grid": 1, "figures": { "tiles": 3.0 } }]);
         found.ink = serde_json::from_value(ink).unwrap();
@@ -76,15 +76,15 @@ fn detections(target: &Target) -> Vec<Detection> {
 }
 
 /// Returns both tables of images.
-fn written(pictures: &[Picture], target: &Target) -> [Vec<u8>; 2] {
+fn written(pictures: &[ImageRecord], target: &Target) -> [Vec<u8>; 2] {
     let mut writer = Writer::new(Vec::new(), Vec::new(), std::slice::from_ref(target)).unwrap();
     pictures.iter().for_each(|picture| writer.push(picture).unwrap());
     writer.finish().unwrap()
 }
 
-fn pictures(target: &Target) -> Vec<Picture> {
-    let mut pictures: Vec<Picture> = detections(target).iter().map(Picture::of).collect();
-    pictures.push(Picture::unread("broken.png", "broken.png: it ends too soon"));
+fn pictures(target: &Target) -> Vec<ImageRecord> {
+    let mut pictures: Vec<ImageRecord> = detections(target).iter().map(ImageRecord::of).collect();
+    pictures.push(ImageRecord::unread("broken.png", "broken.png: it ends too soon"));
     pictures
 }
 
@@ -92,7 +92,7 @@ fn pictures(target: &Target) -> Vec<Picture> {
 fn a_camera_is_the_same_to_the_last_bit_from_tables_and_from_json() {
     let (folder, target) = (tempfile::tempdir().unwrap(), board());
     let at = |name: &str| folder.path().join(name);
-    for name in ["json", "tables", "many/corners", "many/pictures"] {
+    for name in ["json", "tables", "many/corners", "many/images"] {
         std::fs::create_dir_all(at(name)).unwrap();
     }
     std::fs::write(at("board.json"), target.to_json()).unwrap();
@@ -101,15 +101,15 @@ fn a_camera_is_the_same_to_the_last_bit_from_tables_and_from_json() {
         std::fs::write(at(&name), detection::write(&found)).unwrap();
     }
     let all = pictures(&target);
-    let save = |pictures: &[Picture], names: [&str; 2]| {
+    let save = |pictures: &[ImageRecord], names: [&str; 2]| {
         for (name, content) in names.into_iter().zip(written(pictures, &target)) {
             std::fs::write(at(name), content).unwrap();
         }
     };
-    save(&all, ["tables/corners.parquet", "tables/pictures.parquet"]);
+    save(&all, ["tables/corners.parquet", "tables/images.parquet"]);
     // As a cluster writes them: in parts, in any order.
-    save(&all[5..], ["many/corners/1.parquet", "many/pictures/1.parquet"]);
-    save(&all[..5], ["many/corners/2.parquet", "many/pictures/2.parquet"]);
+    save(&all[5..], ["many/corners/1.parquet", "many/images/1.parquet"]);
+    save(&all[..5], ["many/corners/2.parquet", "many/images/2.parquet"]);
     // A part whose images were not written.
     save(&all[..3], ["many/corners/3.parquet", "left.parquet"]);
 
@@ -123,7 +123,7 @@ fn a_camera_is_the_same_to_the_last_bit_from_tables_and_from_json() {
     };
     let of_json = camera("json");
     assert!(of_json[0].contains("\"ink\""), "{}", of_json[0]);
-    for from in ["tables", "tables/corners.parquet", "tables/pictures.parquet", "many"] {
+    for from in ["tables", "tables/corners.parquet", "tables/images.parquet", "many"] {
         assert_eq!(camera(from), of_json, "{from}");
     }
 }
@@ -134,9 +134,9 @@ fn images_survive_a_round_trip() {
     let pictures = pictures(&target);
     let mut reader = Reader::new(Limits::default());
     let contents = written(&pictures, &target).map(|table| reader.add(table).unwrap());
-    assert_eq!(contents, [Contents::Corners, Contents::Pictures]);
+    assert_eq!(contents, [Contents::Corners, Contents::Images]);
     let read = reader.finish().unwrap();
-    assert_eq!((read.pictures, read.short), (pictures, 0));
+    assert_eq!((read.images, read.short), (pictures, 0));
 }
 
 #[test]
@@ -151,9 +151,9 @@ fn inconsistent_tables_are_rejected() {
     };
     assert_eq!(
         error(&[&corners]),
-        "image 0.png: it has corners, but it is not in the `pictures` table"
+        "image 0.png: it has corners, but it is not in the `images` table"
     );
-    assert_eq!(error(&[&rows, &rows]), "image 0.png: it is listed twice in the `pictures` table");
+    assert_eq!(error(&[&rows, &rows]), "image 0.png: it is listed twice in the `images` table");
     let twice = error(&[&rows, &corners, &corners]);
     assert!(
         twice.starts_with("image 0.png: grids[0].corners[1]: another corner has the same row"),
@@ -200,7 +200,7 @@ fn no_table_takes_more_than_its_limit_or_makes_its_reader_panic() {
             Ok(tables) => {
                 read += 1;
                 let numbers =
-                    tables.pictures.iter().filter_map(|picture| picture.found.as_ref().ok());
+                    tables.images.iter().filter_map(|picture| picture.found.as_ref().ok());
                 let mut corners =
                     numbers.flat_map(|found| &found.grids).flat_map(|grid| &grid.corners);
                 assert!(corners.all(|corner| corner.x.is_finite() && corner.y.is_finite()));
@@ -249,18 +249,18 @@ fn a_resumed_run_extends_its_tables_and_keeps_unreadable_ones() {
     assert!(second.iter().all(|picture| picture.found.is_ok()));
 
     // A file that another program wrote under that name is kept.
-    std::fs::write(at("out/pictures.parquet"), b"PAR1 of somebody PAR1").unwrap();
+    std::fs::write(at("out/images.parquet"), b"PAR1 of somebody PAR1").unwrap();
     let said = run(detect).code(2);
     let said = String::from_utf8_lossy(&said.get_output().stderr).into_owned();
-    assert!(said.contains("pictures.parquet contains a Parquet, which would be lost"), "{said}");
+    assert!(said.contains("images.parquet contains a Parquet, which would be lost"), "{said}");
 }
 
-fn read(folder: &Path) -> Vec<Picture> {
+fn read(folder: &Path) -> Vec<ImageRecord> {
     let mut reader = Reader::new(Limits::default());
-    for name in ["corners.parquet", "pictures.parquet"] {
+    for name in ["corners.parquet", "images.parquet"] {
         reader.add(std::fs::read(folder.join(name)).unwrap()).unwrap();
     }
-    let mut pictures = reader.finish().unwrap().pictures;
+    let mut pictures = reader.finish().unwrap().images;
     pictures.sort_by(|one, other| one.image.cmp(&other.image));
     pictures
 }

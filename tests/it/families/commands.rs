@@ -30,7 +30,7 @@ fn a_search_starts_from_a_shipped_family() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let mut page = Page::default();
-    for args in ["d25h7", "d36h10", "d16h5 --min-complexity 0.7", "d16h5 --from-nothing --force"] {
+    for args in ["d25h7", "d36h10", "d16h5 --min-complexity 0.7", "d16h5 --from-scratch --force"] {
         let output = page.warned(at, &format!("deltag gen-family {args} --time 0.1 -o ."));
         assert!(output.status.success(), "{args}");
     }
@@ -48,7 +48,7 @@ fn a_search_by_work_depends_on_its_seed_alone() {
         command.args([
             "gen-family",
             "d16h6",
-            "--from-nothing",
+            "--from-scratch",
             "--work",
             "1",
             "--name",
@@ -169,7 +169,7 @@ fn bad_arguments_give_one_line_and_exit_code_2() {
         "gen-family d25h7 --method lexicode --time 3",
         "gen-family d25h7 --method lexicode --limit 3",
         "gen-family d25h7 --method search --work 3",
-        "gen-family d25h7 --method lexicode --from-nothing",
+        "gen-family d25h7 --method lexicode --from-scratch",
         "gen-family d25h7 --work 3 --time 3",
         "gen-family d25h7 --work 0",
         "verify-family",

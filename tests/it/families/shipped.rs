@@ -207,9 +207,9 @@ fn best_families_of_64_bits_hold() {
         let decoder = Decoder::new(&family);
         let words = TagWords::new(dimension);
         let misread = (0..family.correctable()).fold(0, |bits, i| bits | 1u64 << (63 - 9 * i));
-        let read = words.turn(family.codes()[77]) ^ (misread & !family.free_cells());
+        let read = words.rotate(family.codes()[77]) ^ (misread & !family.free_cells());
         let found = decoder.decode(read, family.correctable()).unwrap();
-        assert_eq!((found.id, found.turns), (77, 1));
+        assert_eq!((found.id, found.rotations), (77, 1));
     }
 }
 
@@ -268,7 +268,7 @@ proptest! {
 
     #[test]
     fn up_to_t_errors_are_corrected(
-        pick: prop::sample::Index, id: prop::sample::Index, turns in 0..3u8,
+        pick: prop::sample::Index, id: prop::sample::Index, rotations in 0..3u8,
         flips in prop::collection::btree_set(0..64u32, 0..6),
     ) {
         // Decoders are built once; all shipped families are used in turn.
@@ -284,22 +284,22 @@ proptest! {
             .take(family.correctable() as usize)
             .collect();
         let read = flips.iter()
-            .fold(words.turns(family.codes()[id])[turns as usize], |word, bit| word ^ 1 << bit);
+            .fold(words.rotations(family.codes()[id])[rotations as usize], |word, bit| word ^ 1 << bit);
         let errors = flips.len() as u32;
         let decoded = decoder.decode(read, family.correctable()).unwrap();
-        prop_assert_eq!((decoded.id as usize, decoded.turns, decoded.errors), (id, turns, errors));
+        prop_assert_eq!((decoded.id as usize, decoded.rotations, decoded.errors), (id, rotations, errors));
         prop_assert_eq!(decoder.decode(read, errors), Some(decoded));
         if errors > 0 {
             prop_assert_eq!(decoder.decode(read, errors - 1), None);
         }
         // The slower search beyond ⌊(h−1)/2⌋ gives the same result.
         let beyond = decoder.decode(read, family.correctable() + 1).unwrap();
-        prop_assert_eq!((beyond.id, beyond.turns, beyond.errors), (decoded.id, turns, errors));
+        prop_assert_eq!((beyond.id, beyond.rotations, beyond.errors), (decoded.id, rotations, errors));
     }
 
     #[test]
     fn both_ways_of_decoding_agree(
-        pick in 0..5usize, word: u64, id: prop::sample::Index, turns in 0..3usize,
+        pick in 0..5usize, word: u64, id: prop::sample::Index, rotations in 0..3usize,
         flips in prop::collection::vec(0..64u32, 0..7),
     ) {
         static PAIRS: std::sync::OnceLock<Vec<(Family, Decoder, Decoder)>> =
@@ -312,7 +312,7 @@ proptest! {
         });
         let (family, blocks, syndromes) = &pairs[pick];
         let words = TagWords::new(family.dimension());
-        let code = words.turns(family.codes()[id.index(family.len())])[turns];
+        let code = words.rotations(family.codes()[id.index(family.len())])[rotations];
         let misread = flips.iter().filter(|&&bit| bit < family.dimension().bits());
         let misread = misread.fold(code, |word, bit| word ^ 1 << bit);
         for read in [word & family.dimension().mask(), misread] {

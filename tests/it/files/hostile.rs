@@ -19,7 +19,7 @@ use tempfile::TempDir;
 const PATIENCE: Duration = Duration::from_secs(100);
 
 /// Maximum memory of a command, kB.
-const MOST_KB: u64 = 1_000_000;
+const MAX_KB: u64 = 1_000_000;
 
 /// Valid files: `b.*` of a board, `s.*` of a solid, a camera and a detection.
 static GOOD: LazyLock<TempDir> = LazyLock::new(|| {
@@ -100,7 +100,7 @@ fn fault(end: &End, codes: &[i32]) -> Option<String> {
         Some(code) if !codes.contains(code) => "other code",
         _ if said.contains("panicked") => "panicked",
         Some(2) if lines != 1 || !said.starts_with("error: ") => "not one line",
-        _ if kb.is_some_and(|kb| kb > MOST_KB) => "too much memory",
+        _ if kb.is_some_and(|kb| kb > MAX_KB) => "too much memory",
         _ => return None,
     };
     Some(format!("{wrong}: code {code:?}, {kb:?} kB, {said}"))

@@ -128,8 +128,8 @@ fn without_a_checkpoint_an_interrupted_lexicode_leaves_nothing() {
 fn an_interrupted_best_search_keeps_the_best_so_far() {
     for (from, pause_ms, must_find) in [
         (None, 3000, true),
-        (Some("--from-nothing"), 0, false),
-        (Some("--from-nothing"), 4000, true),
+        (Some("--from-scratch"), 0, false),
+        (Some("--from-scratch"), 4000, true),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let arguments: Vec<&str> = ["d16h5", "--time", "100000"].into_iter().chain(from).collect();

@@ -59,7 +59,7 @@ fn the_guide_lists_models_and_formats_of_the_library() {
         ["docs/formulation.md", "docs/calibration.md", "docs/recipes.md"].map(read);
     for (name, model) in Model::named() {
         let line = row(&formulation, name, model.kind().name());
-        let names = model.lens().names()[..model.found()].join(" ");
+        let names = model.lens().names()[..model.parameter_count()].join(" ");
         assert!(name == "spline" || line.contains(&names), "{line}: {names}");
         assert!(calibration.contains(&format!("`{name}`")), "{name}");
         if let [first, ..] = model.richer() {

@@ -275,11 +275,11 @@ fn detections() {
     let pictures = pictures(&target);
     let mut first = pictures[0].1.clone();
     first.tone = serde_json::from_str(
-        r#"{"black": 0.1, "white": 0.9, "kappa": 0.2, "kappa_deviation": 0.1, "kappa_odd": 0.2, "used": true}"#,
+        r#"{"black": 0.1, "white": 0.9, "kappa": 0.2, "kappa_sd": 0.1, "kappa_odd": 0.2, "used": true}"#,
     )
     .unwrap();
     first.ink = serde_json::from_str(
-        r#"{"edges": 0.01, "edges_deviation": 0.001, "um": 20.0, "um_deviation": 2.0, "used": true, "pictures": 5}"#,
+        r#"{"edges": 0.01, "edges_sd": 0.001, "um": 20.0, "um_sd": 2.0, "used": true, "images": 5}"#,
     )
     .unwrap();
     first.timing_ms.insert("all".to_owned(), 12.5);

@@ -117,7 +117,7 @@ fn targets_and_their_verification() {
 fn families() {
     let commands = [
         "deltag gen-family d16h8 --work 1 -j $ -o @best",
-        "deltag gen-family d9h3 --work 1 --from-nothing --method algebraic -j $ -o @algebraic",
+        "deltag gen-family d9h3 --work 1 --from-scratch --method algebraic -j $ -o @algebraic",
         "deltag gen-family d9h3 --method search --rounds 1 -j $ -o @search",
     ];
     check(&commands.map(str::to_owned), 3);

@@ -98,7 +98,7 @@ fn only_files_of_the_same_kind_are_replaced() {
         (DELTAG, "export delTag16h5 --format opencv -o out"),
         (DELTAG, "show delTag16h5 --svg --png --dpi 50 -o out"),
         (DELTAG, "sheet delTag16h5 --ids 0-3 --pdf --no-verify -o out"),
-        (DELTAG, "gen-family d9h4 --work 1 --from-nothing -o out"),
+        (DELTAG, "gen-family d9h4 --work 1 --from-scratch -o out"),
     ];
     let foreign: [&[u8]; 3] =
         [b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", b"{\"mine\": 1}", b"\x89PNG\r\n\x1a\n"];

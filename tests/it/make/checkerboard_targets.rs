@@ -43,9 +43,9 @@ fn square_tags_keep_their_distance_and_decode_in_every_rotation() {
         let decoder = Decoder::new(&family);
         let wrong = (0..family.correctable()).fold(0u64, |bits, i| bits | 1 << (3 * i + 1));
         for (id, &code) in (0..).zip(family.codes()) {
-            for (turns, word) in (0..).zip(turns_of(&words, code)) {
+            for (rotations, word) in (0..).zip(turns_of(&words, code)) {
                 let decoded = decoder.decode(word ^ wrong, family.correctable()).unwrap();
-                assert_eq!((decoded.id, decoded.turns), (id, turns), "{name}");
+                assert_eq!((decoded.id, decoded.rotations), (id, rotations), "{name}");
             }
         }
     }
@@ -53,9 +53,9 @@ fn square_tags_keep_their_distance_and_decode_in_every_rotation() {
 
 /// Returns the words of a square tag in its four rotations.
 fn turns_of(words: &TagWords, code: u64) -> [u64; 4] {
-    let once = words.turn(code);
-    let twice = words.turn(once);
-    [code, once, twice, words.turn(twice)]
+    let once = words.rotate(code);
+    let twice = words.rotate(once);
+    [code, once, twice, words.rotate(twice)]
 }
 
 #[test]

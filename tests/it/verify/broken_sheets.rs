@@ -397,8 +397,9 @@ fn a_bar_much_shorter_than_stated_is_measured() {
 /// A triangle with a round hole.
 fn logo(apex: f64) -> Logo {
     let triangle = [(0.0, 80.0), (100.0, 80.0), (apex, 0.0)].map(DVec2::from).to_vec();
-    let turns = (0..60).map(|n| f64::from(n) / 60.0 * std::f64::consts::TAU);
-    let hole = turns.map(|turn| DVec2::new(50.0, 55.0) + 12.0 * DVec2::from_angle(turn)).collect();
+    let rotations = (0..60).map(|n| f64::from(n) / 60.0 * std::f64::consts::TAU);
+    let hole =
+        rotations.map(|turn| DVec2::new(50.0, 55.0) + 12.0 * DVec2::from_angle(turn)).collect();
     Logo::from_outlines(&[triangle, hole]).unwrap()
 }
 

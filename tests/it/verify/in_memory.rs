@@ -215,6 +215,6 @@ fn labels_of_a_net_in_memory_are_compared_by_their_text() {
     assert_told(&compare(&renumbered, name, &pages(&renumbered)), "instead of face number 3");
     assert_told(&compare(&target, name, &whole[..1]), "i-2.svg is missing");
     let verifier = || Verifier::new(&target).unwrap();
-    let guarded = verifier().guarded_by(Guard::Timed).verify(name, &whole).unwrap();
+    let guarded = verifier().with_guard(Guard::Timed).verify(name, &whole).unwrap();
     assert_eq!(verifier().verify(name, &whole).unwrap(), guarded);
 }

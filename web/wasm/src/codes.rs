@@ -49,7 +49,7 @@ impl Codes {
             "distance": family.distance(), "correctable": family.correctable(),
             "kind": family.kind(), "histogram": family.histogram(),
             "linear_programming": bounds.linear_programming, "sphere_packing": bounds.sphere_packing,
-            "turns": family.kind().turns(), "rotation": family.cells().rotation(),
+            "turns": family.kind().rotations(), "rotation": family.cells().rotation(),
         })
         .to_string()
     }
@@ -99,6 +99,6 @@ impl Codes {
     /// `max_errors`.
     pub fn decode(&self, word: u64, max_errors: u32) -> Option<Vec<u32>> {
         let found = self.decoder.decode(word, max_errors)?;
-        Some(vec![found.id, found.turns.into(), found.errors])
+        Some(vec![found.id, found.rotations.into(), found.errors])
     }
 }

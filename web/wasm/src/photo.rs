@@ -11,7 +11,7 @@ use wasm_bindgen::prelude::*;
 use crate::errors::Raise;
 
 /// Maximum number of pixels of an image: the browser keeps several copies in memory.
-const MOST_PIXELS: u64 = 64_000_000;
+const MAX_PIXELS: u64 = 64_000_000;
 
 /// A photograph, decoded as by the programs.
 #[wasm_bindgen]
@@ -28,7 +28,7 @@ impl Photograph {
     #[wasm_bindgen(constructor)]
     pub fn new(name: &str, content: Vec<u8>) -> Result<Self, JsError> {
         let mut limits = Limits::default();
-        limits.max_pixels = MOST_PIXELS;
+        limits.max_pixels = MAX_PIXELS;
         let photograph =
             photograph::read_bytes(Path::new(name), content, &limits, false).raise()?;
         Ok(Self { photograph })

@@ -207,7 +207,7 @@ impl Watcher {
     }
 
     /// Returns whether the next frame is worth keeping: the target is still, and in a new position.
-    pub fn look(&mut self, found: &Found) -> bool {
-        self.0.look(&found.detection).is_worth_keeping()
+    pub fn observe(&mut self, found: &Found) -> bool {
+        self.0.observe(&found.detection).is_worth_keeping()
     }
 }

@@ -1,7 +1,8 @@
 //! Calibrates a camera from corners and writes its report.
 
 use deltille_calibrate::{
-    self, Calibration, Held, Holding, Intrinsics, Model, NextView, Reference, View, Words, views,
+    self, Calibration, HoldStatus, HoldTracker, Intrinsics, Messages, Model, NextView, Reference,
+    View, views,
 };
 use deltille_core::camera::{CameraFile, Pose};
 use deltille_core::detection::{Detection, InkEstimate};
@@ -52,10 +53,10 @@ impl Solved {
         );
         let mut estimate = calibration.solve().raise()?;
         let diagnoses = calibration.explain(&estimate);
-        estimate.excluded.splice(0..0, shown.left_out.into_iter().map(|(_, out)| out));
+        estimate.excluded.splice(0..0, shown.excluded.into_iter().map(|(_, out)| out));
         let found =
             estimate.cameras.first().ok_or_else(|| JsError::new("no camera was calibrated"))?;
-        let words = Words::new(&estimate, None);
+        let words = Messages::new(&estimate, None);
         let said = diagnoses.iter().map(|diagnosis| one_line(&words.sentence(diagnosis))).collect();
         let mut page = Report::new("camera", &estimate);
         // Having too few views to compare models is not an error.
@@ -68,7 +69,7 @@ impl Solved {
             "sd": found.parameters.iter().map(|parameter| parameter.sd).collect::<Vec<_>>(),
             "projection_sd_px": found.projection_sd_px(None, deltille_calibrate::Source::Noise),
         });
-        let json = calibration::write(&estimate, &diagnoses, print, Residuals::LeftOut)
+        let json = calibration::write(&estimate, &diagnoses, print, Residuals::Omitted)
             .unwrap_or_default();
         let file = CameraFile {
             camera: found.camera.clone(),
@@ -153,7 +154,7 @@ pub fn survey(
         return Ok(None);
     };
     let survey = Survey::new(camera);
-    let tilts = survey.views.iter().map(|view| view.tilt_rad.zip(view.away_rad));
+    let tilts = survey.views.iter().map(|view| view.tilt_rad.zip(view.tilt_direction_rad));
     let json = serde_json::json!({
         "size_px": size_px, "cells": survey.cells, "counts": survey.counts, "covered": survey.covered(),
         "tilts": tilts.collect::<Vec<_>>(),
@@ -180,7 +181,7 @@ pub struct Guide {
     views: Vec<View>,
     refused: Vec<NextView>,
     next: NextView,
-    holding: Holding,
+    holding: HoldTracker,
 }
 
 #[wasm_bindgen]
@@ -196,7 +197,7 @@ impl Guide {
         let guide = deltille_calibrate::Guide::new(&target, [width, height], model)
             .ok_or_else(|| JsError::new("guided capture does not support this target and model"))?;
         let next = guide.next(0, None);
-        let holding = Holding::new(&next, places(&Reference::Target(&target)));
+        let holding = HoldTracker::new(&next, places(&Reference::Target(&target)));
         Ok(Self { target, guide, views: Vec::new(), refused: Vec::new(), next, holding })
     }
 
@@ -227,16 +228,16 @@ impl Guide {
     ///
     /// # Errors
     /// Throws if `found` is not a valid detection.
-    pub fn look(&mut self, time_s: f64, found: &str) -> Result<String, JsError> {
+    pub fn observe(&mut self, time_s: f64, found: &str) -> Result<String, JsError> {
         let view = self.view("frame", found)?;
-        let held = self.holding.look(time_s, view.as_ref(), None);
+        let held = self.holding.observe(time_s, view.as_ref(), None);
         let (word, part) = match held {
-            Held::Elsewhere { .. } => ("elsewhere", 0.0),
-            Held::Turned { .. } => ("turned", 0.0),
-            Held::Moving { .. } => ("moving", 0.0),
-            Held::Blurred => ("blurred", 0.0),
-            Held::Steady { part } => ("steady", part),
-            Held::Taken => ("taken", 1.0),
+            HoldStatus::Elsewhere { .. } => ("elsewhere", 0.0),
+            HoldStatus::Turned { .. } => ("turned", 0.0),
+            HoldStatus::Moving { .. } => ("moving", 0.0),
+            HoldStatus::Blurred => ("blurred", 0.0),
+            HoldStatus::Steady { part } => ("steady", part),
+            HoldStatus::Taken => ("taken", 1.0),
             _ => ("unseen", 0.0),
         };
         Ok(serde_json::json!({ "held": word, "part": part }).to_string())
@@ -253,6 +254,6 @@ impl Guide {
         let reference = Reference::Target(&self.target);
         let guide = self.guide.clone().avoiding(&self.refused);
         self.next = guide.after(&reference, &self.views).next;
-        self.holding = Holding::new(&self.next, places(&reference));
+        self.holding = HoldTracker::new(&self.next, places(&reference));
     }
 }

@@ -12,21 +12,21 @@ use crate::problem::bundle::Problem;
 #[non_exhaustive]
 pub struct Finding {
     /// The common element.
-    pub shared: Shared,
+    pub pattern: OutlierPattern,
     /// Number of outliers among its corners.
     pub outliers: usize,
     /// Number of all its corners.
     pub corners: usize,
     /// Whether all of them were excluded from the calibration.
-    pub left_out: bool,
+    pub is_excluded: bool,
 }
 
 /// The element that outliers have in common.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Shared {
+pub enum OutlierPattern {
     /// They lie far outside their image.
-    Beyond {
+    OutsideImage {
         /// Index of the camera.
         camera: usize,
         /// Name of the view.
@@ -80,11 +80,11 @@ pub struct Moved {
     /// Distance of its centre from the stated position, mm.
     pub by_mm: f64,
     /// Angle between its orientation and the stated one, rad.
-    pub turned_rad: f64,
+    pub rotation_rad: f64,
 }
 
 /// Least number of outliers for a finding: fewer may coincide by chance.
-const LEAST_OUTLIERS: usize = 6;
+const MIN_OUTLIERS: usize = 6;
 
 /// Least fraction of outliers among the corners of a finding.
 const MOST: f64 = 0.5;
@@ -99,7 +99,7 @@ const SIGNIFICANT: f64 = 5.0;
 const CELLS: f64 = 8.0;
 
 /// Least number of views with outliers in a region of the image.
-const LEAST_VIEWS: usize = 3;
+const MIN_VIEWS: usize = 3;
 
 /// Index of a camera, and a cell of its image.
 type Cell = (usize, [i32; 2]);
@@ -135,7 +135,7 @@ impl Count {
     pub(super) fn exceeds(self, others: Count) -> bool {
         let (count, chance) = (self.corners as f64, others.share());
         let more = count * (self.share() - chance);
-        self.outliers >= LEAST_OUTLIERS
+        self.outliers >= MIN_OUTLIERS
             && more > SIGNIFICANT * (count * chance * (1.0 - chance)).sqrt()
     }
 }
@@ -169,24 +169,26 @@ pub(super) fn shared_outliers(
             }
         }
     }
-    let finding = |shared: Shared, count: Count| Finding {
-        shared,
+    let finding = |pattern: OutlierPattern, count: Count| Finding {
+        pattern,
         outliers: count.outliers,
         corners: count.corners,
-        left_out: false,
+        is_excluded: false,
     };
     cameras.retain(|_, count| count.stands_out(all));
-    let mut found: Vec<Finding> =
-        cameras.iter().map(|(&camera, &count)| finding(Shared::Camera { camera }, count)).collect();
+    let mut found: Vec<Finding> = cameras
+        .iter()
+        .map(|(&camera, &count)| finding(OutlierPattern::Camera { camera }, count))
+        .collect();
     for (&(camera, frame), &count) in views.iter().filter(|(_, count)| count.stands_out(all)) {
         if !cameras.contains_key(&camera) {
-            found.push(finding(Shared::View { camera, view: names(frame) }, count));
+            found.push(finding(OutlierPattern::View { camera, view: names(frame) }, count));
         }
     }
     // Merge the conspicuous cells of a camera into one rectangle.
     let mut regions: BTreeMap<usize, (Count, [i32; 2], [i32; 2])> = BTreeMap::new();
     for (&(camera, cell), (count, of_views)) in &cells {
-        let is_of_image = of_views.len() >= LEAST_VIEWS && !cameras.contains_key(&camera);
+        let is_of_image = of_views.len() >= MIN_VIEWS && !cameras.contains_key(&camera);
         if is_of_image && count.stands_out(all) {
             let (sum, from, to) = regions.entry(camera).or_insert((Count::default(), cell, cell));
             sum.outliers += count.outliers;
@@ -202,7 +204,7 @@ pub(super) fn shared_outliers(
         let size = DVec2::new(width.into(), height.into());
         let from_px = DVec2::from(from.map(|cell| f64::from(cell.max(0)))) * cell_px;
         let to_px = (DVec2::from(to.map(|cell| f64::from(cell + 1))) * cell_px).min(size);
-        found.push(finding(Shared::Region { camera, from_px, to_px }, count));
+        found.push(finding(OutlierPattern::Region { camera, from_px, to_px }, count));
     }
     found
 }

@@ -35,14 +35,14 @@ pub(crate) const MATTERS: f64 = 0.5;
 const SIGNIFICANT_PANEL: f64 = 5.0;
 
 /// Least number of panels for identifying a displaced one.
-const LEAST_PANELS: usize = 3;
+const MIN_PANELS: usize = 3;
 
 /// Least sensitivity to a displacement of a corner, relative to the best direction; the information is its square.
 /// Below it all views came from the same side, and the direction is not estimated.
 const BLIND: f64 = 0.03;
 
 /// Least number of views of a corner: each has two coordinates, and the displacement three.
-const LEAST_VIEWS: usize = 3;
+const MIN_VIEWS: usize = 3;
 
 /// A pattern that noise does not explain, and that matters compared with the noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,7 +73,7 @@ struct Seen {
     panel: PanelRef,
     cell: [i32; 2],
     label: [i32; 2],
-    place_mm: DVec3,
+    position_mm: DVec3,
     residual: DVec2,
     /// Derivative of the residual with respect to the corner's position on the panel, 1/mm.
     by_place: [DVec3; 2],
@@ -176,7 +176,7 @@ fn seen(problem: &Problem, whitening: &Whitening) -> (Vec<Seen>, f64) {
                 panel: block.panel,
                 cell: (corner.pixel / cell_px).floor().as_ivec2().to_array(),
                 label: [corner.row, corner.col],
-                place_mm: corner.panel_mm,
+                position_mm: corner.panel_mm,
                 residual: whitened,
                 by_place: [a * x, b * x + c * y],
             });
@@ -226,7 +226,7 @@ fn over_target(seen: &[Seen]) -> Explained {
         corners.entry((corner.panel, corner.label)).or_default().push(index);
     }
     let mut found = Explained::default();
-    for ((panel, _), views) in corners.iter().filter(|(_, views)| views.len() >= LEAST_VIEWS) {
+    for ((panel, _), views) in corners.iter().filter(|(_, views)| views.len() >= MIN_VIEWS) {
         let row = |by: DVec3, _: &Seen| by.to_array();
         let of_corner = best_move(seen, views, row);
         let [x, y, z] = of_corner.by;
@@ -248,15 +248,15 @@ fn over_panels(seen: &[Seen]) -> Explained {
     }
     let mut found = Explained::default();
     // Of two panels it is unknown which one is wrong, and a single one has no reference.
-    if panels.len() < LEAST_PANELS {
+    if panels.len() < MIN_PANELS {
         return found;
     }
     for (&panel, views) in &panels {
-        let places = || views.iter().map(|&index| seen[index].place_mm);
+        let places = || views.iter().map(|&index| seen[index].position_mm);
         let middle = places().sum::<DVec3>() / views.len() as f64;
         let reach = places().map(|at| at.distance(middle)).fold(f64::MIN_POSITIVE, f64::max);
         // Rotations as lengths at the rim, so that all unknowns have the same unit.
-        let arm = |seen: &Seen| (seen.place_mm - middle) / reach;
+        let arm = |seen: &Seen| (seen.position_mm - middle) / reach;
         let row = |by: DVec3, seen: &Seen| {
             let turn = arm(seen).cross(by);
             [by.x, by.y, by.z, turn.x, turn.y, turn.z]
@@ -352,9 +352,9 @@ impl Explained {
     fn pattern(&self) -> Option<f64> {
         let noise = self.left / self.freedom;
         let pattern = self.explained - self.unknowns * noise;
-        let is_sure = self.deviate() > SIGNIFICANT;
+        let is_confirmed = self.deviate() > SIGNIFICANT;
         let matters = pattern > MATTERS * MATTERS * (self.all - pattern);
-        (is_sure && matters).then_some(pattern / self.all)
+        (is_confirmed && matters).then_some(pattern / self.all)
     }
 
     fn rms_mm(&self) -> f64 {

@@ -11,7 +11,7 @@ use glam::DVec2;
 use crate::equations::minimise::{Minimum, Until, minimise};
 use crate::error::CalibrationError;
 use crate::input::loss::Loss;
-use crate::input::observation::{LEAST_CORNERS, Observation};
+use crate::input::observation::{MIN_CORNERS, Observation};
 use crate::input::weights::Weights;
 use crate::problem::bundle::Problem;
 use crate::problem::unknowns::Block;
@@ -23,7 +23,7 @@ const WEIGHT_ROUNDS: usize = 3;
 
 /// Most rounds until the set of corners that count is stable; a corner at the limit may change
 /// sides for ever.
-const MOST_ROUNDS: usize = 12;
+const MAX_ROUNDS: usize = 12;
 
 /// Least size of a gross outlier, in standard deviations. Beyond [`OUTLIER_SIGMA`] a corner is called an outlier.
 const GROSS_SIGMA: f64 = 2.0 * OUTLIER_SIGMA;
@@ -35,11 +35,11 @@ const IN_THE_GAP: f64 = 0.25;
 
 /// Lens model errors are smooth: more than the fraction `SMOOTH` of the neighbours of corners with large residuals have
 /// residuals towards the same side, of more than the fraction `FALLS_OFF` of the size and of more than
-/// `LEAST_SMOOTH_SIGMA` standard deviations. Wrong positions are not smooth; for labels or corners that are displaced
+/// `MIN_SMOOTH_SIGMA` standard deviations. Wrong positions are not smooth; for labels or corners that are displaced
 /// together, only the displaced corners are such neighbours.
 const SMOOTH: f64 = 0.5;
 const FALLS_OFF: f64 = 0.05;
-const LEAST_SMOOTH_SIGMA: f64 = 3.0;
+const MIN_SMOOTH_SIGMA: f64 = 3.0;
 
 /// The parts of a problem that agree with each other.
 #[derive(Clone, Debug)]
@@ -94,7 +94,7 @@ pub(super) fn settle(
     // In the first round all corners count except those that stand out, so that a lens is judged
     // with its rim. With equal weights and squared loss, reweighting changes nothing.
     let rounds = match whitening.common_px.is_some() || loss != Loss::Squared {
-        true => MOST_ROUNDS,
+        true => MAX_ROUNDS,
         false => 0,
     };
     for round in 1..rounds {
@@ -138,7 +138,7 @@ pub(super) fn with_gross_errors(
     let limit = gross_limit(&of_frames.concat(), whitening.sigma);
     let limits = of_frames.into_iter().map(|mut off| {
         off.sort_by(f64::total_cmp);
-        let needed = off.get(LEAST_CORNERS.min(off.len()).saturating_sub(1)).copied();
+        let needed = off.get(MIN_CORNERS.min(off.len()).saturating_sub(1)).copied();
         needed.filter(|off| off.is_finite()).unwrap_or_default().max(limit)
     });
     let limits: Vec<f64> = limits.collect();
@@ -146,7 +146,7 @@ pub(super) fn with_gross_errors(
     let mut gross: Vec<Vec<bool>> = of_blocks
         .map(|(block, off)| off.iter().map(|off| *off > limits[block.frame]).collect())
         .collect();
-    let least = LEAST_SMOOTH_SIGMA * whitening.sigma;
+    let least = MIN_SMOOTH_SIGMA * whitening.sigma;
     let of_blocks = problem.blocks.iter().zip(&gross).zip(&off).zip(left_out);
     let smooth: Vec<Vec<[usize; 2]>> = of_blocks
         .map(|(((block, gross), off), out)| match *out || !gross.contains(&true) {

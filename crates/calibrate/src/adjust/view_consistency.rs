@@ -27,13 +27,13 @@ use deltille_core::damping::Damping;
 use deltille_core::statistics::median;
 
 /// Least number of views for the test: three remain without the tested one.
-const LEAST_VIEWS: usize = 4;
+const MIN_VIEWS: usize = 4;
 
 /// Least information on a direction of the camera parameters. A direction is undetermined if all views together
 /// contribute less than the fraction `OPEN` of the best direction. It is not tested if the view, or all others,
-/// contribute less than the fraction `LEAST_PART` of it.
+/// contribute less than the fraction `MIN_PART` of it.
 const OPEN: f64 = 1e-9;
-const LEAST_PART: f64 = 1e-3;
+const MIN_PART: f64 = 1e-3;
 
 /// Views mostly agree when the median of T, divided by its degrees of freedom, is below this: 0.9
 /// is usual.
@@ -66,7 +66,7 @@ impl Pull {
         let mut found = Self { statistic: 0.0, freedom: 0.0, moves: 0.0 };
         for (part, along) in directions {
             let others = 1.0 - part;
-            if part > LEAST_PART && others > LEAST_PART {
+            if part > MIN_PART && others > MIN_PART {
                 let along = along.powi(2) / variance;
                 found.statistic += along / (part * others);
                 found.moves += along / (others * others);
@@ -94,7 +94,7 @@ impl Consistency {
         let pulls = pulls(settled, loss)?;
         let tested = pulls.iter().flatten().filter(|pull| pull.freedom > 0.0);
         let tested: Vec<Pull> = tested.copied().collect();
-        if tested.len() < LEAST_VIEWS {
+        if tested.len() < MIN_VIEWS {
             return None;
         }
         let usual = median(tested.iter().map(|pull| pull.statistic).collect()).unwrap_or(0.0);

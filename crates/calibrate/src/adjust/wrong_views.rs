@@ -19,14 +19,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DVec2, DVec3};
 
-use super::finding::{Count, Finding, Moved, Shared, shared_outliers};
+use super::finding::{Count, Finding, Moved, OutlierPattern, shared_outliers};
 use super::lack_of_fit::lack_of_fit;
 use super::reweighting::{Kept, Settled, settle, with_gross_errors};
 use super::view_consistency::Consistency;
 use crate::equations::minimise::{Until, minimise};
 use crate::error::CalibrationError;
 use crate::input::loss::Loss;
-use crate::input::observation::{LEAST_CORNERS, Sighting, View};
+use crate::input::observation::{MIN_CORNERS, Sighting, View};
 use crate::input::panel::PanelRef;
 use crate::input::weights::Weights;
 use crate::problem::bundle::Problem;
@@ -41,9 +41,9 @@ use deltille_core::statistics::median;
 const NARROW: f64 = 0.5;
 
 /// The reduction ends when a round leaves more than this fraction of the scale, or after
-/// [`MOST_ROUNDS`].
+/// [`MAX_ROUNDS`].
 const STILL: f64 = 0.98;
-const MOST_ROUNDS: usize = 12;
+const MAX_ROUNDS: usize = 12;
 
 /// Fraction of the corners of each frame that are followed from between two groups, as most corners
 /// are right.
@@ -54,7 +54,7 @@ const FOLLOWED: f64 = 0.5;
 const SHRUNK: f64 = 0.5;
 
 /// Least number of panels for identifying a wrong one: of two it is not known which.
-const LEAST_PANELS: usize = 3;
+const MIN_PANELS: usize = 3;
 
 /// Distance beyond the image, in image sizes, from which a corner cannot have been seen in it.
 const BEYOND: f64 = 1.0;
@@ -279,7 +279,12 @@ impl Gross {
         let of_panels = self.panels.iter().map(|&panel| {
             let Count { outliers, corners } = count(&|block| block.panel == panel);
             let moved = moved(settled, panel);
-            Finding { shared: Shared::Panel { panel, moved }, outliers, corners, left_out: true }
+            Finding {
+                pattern: OutlierPattern::Panel { panel, moved },
+                outliers,
+                corners,
+                is_excluded: true,
+            }
         });
         let mut found: Vec<Finding> = of_panels.collect();
         let single = self.problem.blocks.iter().zip(&self.left_out).zip(&self.off_px);
@@ -290,8 +295,8 @@ impl Gross {
             }
             let view = names(frame);
             let corners = observations.len();
-            let shared = Shared::PanelInView { panel, camera, view, off_px };
-            found.push(Finding { shared, outliers: corners, corners, left_out: true });
+            let pattern = OutlierPattern::PanelInView { panel, camera, view, off_px };
+            found.push(Finding { pattern, outliers: corners, corners, is_excluded: true });
         }
         found.extend(shared_outliers(problem, outliers, &left_out, |frame| names(kept[frame])));
         found
@@ -335,7 +340,7 @@ fn agree(problem: Problem) -> Option<(Agreed, BTreeSet<PanelRef>)> {
     let seen: BTreeSet<PanelRef> = problem.blocks.iter().map(|block| block.panel).collect();
     let mut wrong: BTreeSet<PanelRef> = BTreeSet::new();
     let all = narrowed(problem)?;
-    if seen.len() < LEAST_PANELS {
+    if seen.len() < MIN_PANELS {
         return Some((all, wrong));
     }
     let mut agreed = all.clone();
@@ -423,7 +428,7 @@ fn worst_panel(problem: &Problem, sigma: f64, wrong: &BTreeSet<PanelRef>) -> Opt
 /// Estimates where most corners agree, with a redescending loss whose scale shrinks in every round.
 fn narrowed(mut problem: Problem) -> Option<Agreed> {
     let mut sigma = f64::INFINITY;
-    for _ in 0..MOST_ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let mut whitening = scale(&problem);
         if whitening.sigma > STILL * sigma {
             break;
@@ -447,7 +452,7 @@ fn narrowed(mut problem: Problem) -> Option<Agreed> {
 fn to_larger_group(problem: &Problem) -> Option<(Problem, Whitening)> {
     let between = scale(problem);
     let (mut found, mut whitening) = (problem.clone(), between.clone());
-    for _ in 0..MOST_ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let part = found.with_corners(&nearest_of_frames(&found, &whitening));
         let of_part = scale(&part);
         found = found.at(&minimise(part, &of_part, Loss::Squared, Until::Rough)?.problem);
@@ -469,7 +474,7 @@ fn nearest_of_frames(problem: &Problem, whitening: &Whitening) -> Vec<Vec<bool>>
     let farthest = of_frames.into_iter().map(|mut off| {
         off.sort_by(f64::total_cmp);
         let followed = (FOLLOWED * off.len() as f64).ceil() as usize;
-        off.get(followed.max(LEAST_CORNERS).min(off.len()).saturating_sub(1)).copied()
+        off.get(followed.max(MIN_CORNERS).min(off.len()).saturating_sub(1)).copied()
     });
     let farthest: Vec<f64> = farthest.map(Option::unwrap_or_default).collect();
     let of_block = |(block, off): (&Block, &Vec<f64>)| {
@@ -514,7 +519,7 @@ fn moved(settled: &Settled, panel: PanelRef) -> Option<Moved> {
     let middle = seen().sum::<DVec3>() / seen().count().max(1) as f64;
     (2 * count.outliers < count.corners).then(|| Moved {
         by_mm: place.apply(middle).distance(stated.apply(middle)),
-        turned_rad: place.rotation.angle_between(stated.rotation),
+        rotation_rad: place.rotation.angle_between(stated.rotation),
     })
 }
 
@@ -535,11 +540,11 @@ pub(crate) fn within_pictures(views: &[View], camera: usize) -> (Vec<View>, Vec<
         let within = View { sightings: sightings.collect(), ..view.clone() };
         let (corners, left) = (view.corner_count(), within.corner_count());
         if left < corners {
-            let shared = Shared::Beyond { camera, view: view.name.clone() };
+            let pattern = OutlierPattern::OutsideImage { camera, view: view.name.clone() };
             let outliers = corners - left;
-            found.push(Finding { shared, outliers, corners, left_out: true });
+            found.push(Finding { pattern, outliers, corners, is_excluded: true });
         }
-        (left == corners || left >= LEAST_CORNERS).then_some(within)
+        (left == corners || left >= MIN_CORNERS).then_some(within)
     };
     (views.iter().filter_map(of_view).collect(), found)
 }

@@ -26,22 +26,22 @@ use crate::uncertainty::projection::{
 };
 use deltille_core::camera::Pose;
 use deltille_core::setting::Setting::{CompareBoardsAssumeTarget, RegionImage};
-use deltille_core::statistics::{chi_squared_chance, f_chance};
+use deltille_core::statistics::{chi_squared_p_value, f_p_value};
 use deltille_core::targets::{check_result_of, check_same_board};
 
 /// Number of grid positions along the longer side of the image.
-const PLACES: usize = 40;
+const POSITIONS: usize = 40;
 
 /// Least number of corners in a cell and its neighbours for a cell to count as seen: single corners at the border of an
 /// image carry little information.
 const AROUND: usize = 5;
 
 /// Most iterations of the motion, and the change at which it has converged.
-const MOST_STEPS: usize = 50;
+const MAX_STEPS: usize = 50;
 const SAME_PX: f64 = 1e-9;
 
 /// Least standard deviation of a calibration, px: neither lens nor sensor follow their model exactly.
-const LEAST_SD_PX: f64 = 1e-3;
+const MIN_SD_PX: f64 = 1e-3;
 
 /// Significance level of the test that the camera has changed.
 const SELDOM: f64 = 1e-3;
@@ -67,7 +67,7 @@ pub struct Comparison {
     /// Number of grid positions along a row of the image.
     pub columns: usize,
     /// The difference of the second camera, row by row; `None` beyond one of the lenses.
-    pub places: Vec<Option<Difference>>,
+    pub positions: Vec<Option<Difference>>,
     /// The motion from the view of the first camera to that of the second: a rotation, and for points that are not at
     /// infinity a translation.
     pub second_from_first: Pose,
@@ -76,7 +76,7 @@ pub struct Comparison {
     /// The RMS difference expected from the uncertainties of both; `None` if they are not known.
     pub expected_px: Option<f64>,
     /// Probability that an unchanged camera shows such a difference.
-    pub chance: Option<f64>,
+    pub p_value: Option<f64>,
     /// Whether the uncertainty of the first and of the second camera is missing.
     pub lacks_uncertainty: [bool; 2],
 }
@@ -120,11 +120,11 @@ impl Default for Comparison {
         Self {
             distance_mm: None,
             columns: 0,
-            places: Vec::new(),
+            positions: Vec::new(),
             second_from_first: Pose::IDENTITY,
             rms_px: 0.0,
             expected_px: None,
-            chance: None,
+            p_value: None,
             lacks_uncertainty: [false; 2],
         }
     }
@@ -175,7 +175,7 @@ impl Comparison {
         }
         let grid = Grid::new(size(first));
         let compared = grid.compared(first, second, region);
-        let places: Vec<Option<Place>> = (0..grid.columns * grid.rows)
+        let positions: Vec<Option<Place>> = (0..grid.columns * grid.rows)
             .map(|index| {
                 let pixel = grid.pixel(index);
                 let point = seen_at(&first.camera, pixel, distance_mm)?;
@@ -183,13 +183,14 @@ impl Comparison {
                 second.camera.project(point).map(|_| Place { pixel, point, is_compared })
             })
             .collect();
-        let used: Vec<&Place> = places.iter().flatten().filter(|place| place.is_compared).collect();
-        if used.len() < LEAST_PLACES {
+        let used: Vec<&Place> =
+            positions.iter().flatten().filter(|place| place.is_compared).collect();
+        if used.len() < MIN_POSITIONS {
             return Err(ComparisonError::Nothing);
         }
         let motion = aligned(second, &used, distance_mm);
         let known = Known::of(first, second, &used, &motion, distance_mm);
-        let differences = places.iter().map(|place| {
+        let differences = positions.iter().map(|place| {
             let Place { pixel, point, is_compared } = *place.as_ref()?;
             let by = second.camera.project(motion.apply(point))? - pixel;
             let sd_px = known.as_ref().and_then(|known| known.sd_px(first, second, &motion, point));
@@ -207,8 +208,8 @@ impl Comparison {
             columns: grid.columns,
             rms_px: (squares / (2.0 * inside().count() as f64)).sqrt(),
             expected_px: known.as_ref().map(|known| known.expected_px),
-            chance: known.as_ref().map(|known| known.chance),
-            places: differences,
+            p_value: known.as_ref().map(|known| known.p_value),
+            positions: differences,
             second_from_first,
             lacks_uncertainty: [first, second].map(|of| half_of(of).is_none()),
         })
@@ -216,7 +217,7 @@ impl Comparison {
 
     /// The compared positions.
     pub fn compared(&self) -> impl Iterator<Item = &Difference> {
-        self.places.iter().flatten().filter(|place| place.is_compared)
+        self.positions.iter().flatten().filter(|place| place.is_compared)
     }
 
     /// The largest difference at a compared position, px.
@@ -226,7 +227,7 @@ impl Comparison {
 
     /// Whether the cameras differ by more than their uncertainties explain; `None` if these are not known.
     pub fn is_significant(&self) -> Option<bool> {
-        self.chance.map(|chance| chance < SELDOM)
+        self.p_value.map(|p_value| p_value < SELDOM)
     }
 }
 
@@ -239,11 +240,11 @@ pub struct CameraMotion {
     /// The moved camera.
     pub to: String,
     /// Rotation about its axes, rad.
-    pub turn_rad: DVec3,
+    pub rotation_rad: DVec3,
     /// Translation along its axes, mm.
-    pub moved_mm: DVec3,
+    pub translation_mm: DVec3,
     /// Probability of such a motion if nothing has moved; `None` if standard deviations are not known.
-    pub chance: Option<f64>,
+    pub p_value: Option<f64>,
 }
 
 impl CameraMotion {
@@ -261,30 +262,30 @@ impl CameraMotion {
         let motion = |&(a, b): &(&CameraEstimate, &CameraEstimate)| {
             let before = a.camera_from_rig.after(&first.camera_from_rig.inverse());
             let after = b.camera_from_rig.after(&second.camera_from_rig.inverse());
-            let [turn_rad, moved_mm] = after.off(&before);
+            let [rotation_rad, translation_mm] = after.off(&before);
             let deviations = |of: &CameraEstimate| of.observed_pose_sd.or(of.pose_sd);
             let known = deviations(a).zip(deviations(b)).filter(|_| is_frame);
-            let off = turn_rad.to_array().into_iter().chain(moved_mm.to_array());
-            let chance = known.map(|(a, b)| {
+            let off = rotation_rad.to_array().into_iter().chain(translation_mm.to_array());
+            let p_value = known.map(|(a, b)| {
                 // Bonferroni bound for the largest of six, whatever their correlation.
                 let largest = off.zip(a.iter().zip(b)).map(|(off, (a, b))| off.abs() / a.hypot(b));
                 let largest = largest.fold(0.0, f64::max);
                 (6.0 * libm::erfc(largest / std::f64::consts::SQRT_2)).min(1.0)
             });
             let (from, to) = (first.name.clone(), a.name.clone());
-            Self { from, to, turn_rad, moved_mm, chance }
+            Self { from, to, rotation_rad, translation_mm, p_value }
         };
         others.map(motion).collect()
     }
 
     /// Whether the camera moved by more than the standard deviations explain; `None` if these are not known.
     pub fn is_significant(&self) -> Option<bool> {
-        self.chance.map(|chance| chance < SELDOM)
+        self.p_value.map(|p_value| p_value < SELDOM)
     }
 }
 
 /// Least number of compared positions: a motion has six unknowns.
-const LEAST_PLACES: usize = 6;
+const MIN_POSITIONS: usize = 6;
 
 /// A position in the image, and the point that the first camera sees there.
 struct Place {
@@ -303,7 +304,7 @@ struct Grid {
 impl Grid {
     fn new(size: [u32; 2]) -> Self {
         let size = DVec2::from(size.map(f64::from));
-        let parts = (size * PLACES as f64 / size.max_element()).round().max(DVec2::ONE);
+        let parts = (size * POSITIONS as f64 / size.max_element()).round().max(DVec2::ONE);
         Self { size, columns: parts.x as usize, rows: parts.y as usize }
     }
 
@@ -358,13 +359,13 @@ impl Grid {
 }
 
 /// The motion after which the second camera projects points nearest to their pixels in the first.
-fn aligned(second: &CameraEstimate, places: &[&Place], distance_mm: Option<f64>) -> Pose {
+fn aligned(second: &CameraEstimate, positions: &[&Place], distance_mm: Option<f64>) -> Pose {
     let unknowns = unknowns(distance_mm);
     let mut motion = Pose::IDENTITY;
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let mut matrix = DMatrix::zeros(unknowns, unknowns);
         let mut right = DVector::zeros(unknowns);
-        for place in places {
+        for place in positions {
             let point = motion.apply(place.point);
             let Some(at) = second.camera.project_with_derivatives(point) else { continue };
             let rows = by_motion(&at, point).columns(0, unknowns).into_owned();
@@ -409,7 +410,7 @@ const SINGULAR: f64 = 1e-12;
 /// The difference expected from the uncertainties of two cameras.
 struct Known {
     expected_px: f64,
-    chance: f64,
+    p_value: f64,
     /// Square roots of the covariances of both cameras' parameters.
     halves: [DMatrix<f64>; 2],
     /// The motion that belongs to each of their columns.
@@ -422,7 +423,7 @@ impl Known {
     fn of(
         first: &CameraEstimate,
         second: &CameraEstimate,
-        places: &[&Place],
+        positions: &[&Place],
         motion: &Pose,
         distance_mm: Option<f64>,
     ) -> Option<Self> {
@@ -431,12 +432,12 @@ impl Known {
         let count = halves.iter().map(DMatrix::ncols).sum();
         let mut known = Self {
             expected_px: 0.0,
-            chance: 1.0,
+            p_value: 1.0,
             halves,
             motions: DMatrix::zeros(unknowns, count),
             unknowns,
         };
-        let rows = places.iter().filter_map(|place| {
+        let rows = positions.iter().filter_map(|place| {
             let of_motion = known.by_motion(second, motion, place.point)?;
             let changes = known.changes(first, second, motion, place.point)?;
             let by = second.camera.project(motion.apply(place.point))? - place.pixel;
@@ -459,9 +460,9 @@ impl Known {
         }
         let coordinates = 2.0 * rows.len() as f64;
         known.expected_px = (gram.trace() / coordinates).sqrt();
-        let mean = gram.trace() + coordinates * LEAST_SD_PX.powi(2);
+        let mean = gram.trace() + coordinates * MIN_SD_PX.powi(2);
         let freedom = [first, second].map(CameraEstimate::observed_freedom);
-        known.chance = chance_of(square, mean, gram.norm_squared(), freedom);
+        known.p_value = chance_of(square, mean, gram.norm_squared(), freedom);
         Some(known)
     }
 
@@ -517,8 +518,8 @@ fn chance_of(found: f64, mean: f64, spread: f64, known: [Option<f64>; 2]) -> f64
     }
     let freedom = (mean * mean / spread).round().max(1.0);
     match known.into_iter().flatten().reduce(f64::min) {
-        Some(known) => f_chance(found / mean, freedom, known),
-        None => chi_squared_chance(found * freedom / mean, freedom as usize),
+        Some(known) => f_p_value(found / mean, freedom, known),
+        None => chi_squared_p_value(found * freedom / mean, freedom as usize),
     }
 }
 

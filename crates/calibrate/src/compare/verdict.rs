@@ -50,7 +50,7 @@ impl Verdict {
 impl Comparison {
     /// Why the comparison cannot decide whether the camera has changed; `None` if it can.
     pub fn why_undecided(&self) -> Option<&'static str> {
-        match (self.chance, self.lacks_uncertainty) {
+        match (self.p_value, self.lacks_uncertainty) {
             (Some(_), _) => None,
             (None, [true, true]) => Some("both calibrations lack uncertainties"),
             (None, [true, false]) => Some("the first calibration lacks uncertainties"),
@@ -65,7 +65,7 @@ impl Comparison {
 impl CameraMotion {
     /// Why the comparison cannot decide whether the camera has moved; `None` if it can.
     pub fn why_undecided(&self) -> Option<&'static str> {
-        self.chance
+        self.p_value
             .is_none()
             .then_some("the pose uncertainty is missing in at least one calibration")
     }
@@ -75,8 +75,8 @@ impl CameraMotion {
 mod tests {
     use super::*;
 
-    fn comparison(rms_px: f64, chance: Option<f64>) -> Comparison {
-        Comparison { rms_px, chance, ..Comparison::default() }
+    fn comparison(rms_px: f64, p_value: Option<f64>) -> Comparison {
+        Comparison { rms_px, p_value, ..Comparison::default() }
     }
 
     #[test]

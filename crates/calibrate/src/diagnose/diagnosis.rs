@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::model_selection::{Alone, FOREIGN_PART, Instead, Remedy, is_absurd, is_explained};
+use super::model_selection::{Alone, Alternative, FOREIGN_PART, Remedy, is_absurd, is_explained};
 use super::one_state::{BoardStretch, CameraChange, RollingShutter, State};
-use crate::adjust::finding::{Finding, Shared};
+use crate::adjust::finding::{Finding, OutlierPattern};
 use crate::adjust::lack_of_fit::LackOfFit;
-use crate::estimate::lens_end::LensEnd;
+use crate::estimate::lens_limit::LensLimit;
 use crate::estimate::values::{CameraEstimate, Estimate};
 use crate::input::calibration::Calibration;
 use crate::input::order::in_order;
@@ -20,7 +20,7 @@ use deltille_core::camera::Camera;
 const POOR_RMS_PX: f64 = 1.0;
 
 /// Fraction of the views that a calibration may exclude.
-const MOST_LEFT_OUT: f64 = 0.2;
+const MAX_EXCLUDED: f64 = 0.2;
 
 /// Least difference of the focal lengths of two minima, in standard deviations.
 const APART_SIGMA: f64 = 10.0;
@@ -31,36 +31,36 @@ const NEARLY: f64 = 1.5;
 #[non_exhaustive]
 pub enum Diagnosis {
     /// A given camera did not take the images; the estimate is unusable.
-    ForeignCamera {
+    WrongCamera {
         /// The camera.
         camera: usize,
         /// RMS residual per axis without outliers, px.
         rms_px: f64,
     },
     /// The residuals of an estimated camera are so large that the estimate is unusable.
-    AbsurdFit {
+    UnusableFit {
         /// The camera.
         camera: usize,
         /// RMS residual per axis without outliers, px.
         rms_px: f64,
     },
     /// More than a fifth of the views (of a rig: of the frames) were excluded, so the result rests on the others only.
-    ManyLeftOut {
+    ManyExcluded {
         /// Number of excluded views or frames.
-        left_out: usize,
+        excluded: usize,
         /// Number of all views or frames.
         all: usize,
     },
     /// More than a fifth of the corners were excluded with their panels, in views whose other panels were kept, so the
     /// result rests on the others only.
-    ManyPanelsLeftOut {
+    ManyPanelsExcluded {
         /// Number of excluded corners.
-        left_out: usize,
+        excluded: usize,
         /// Number of all corners.
         all: usize,
     },
     /// Another camera of the same model fits the views as well or nearly as well.
-    OtherMinimum {
+    SecondMinimum {
         /// The camera.
         camera: usize,
         /// The other camera.
@@ -69,7 +69,7 @@ pub enum Diagnosis {
         rms_px: f64,
     },
     /// A camera that lags behind the others by some frames; its frames were re-paired.
-    Late {
+    DelayedCamera {
         /// The camera.
         camera: usize,
         /// Lag in frames; negative if the camera leads.
@@ -85,7 +85,7 @@ pub enum Diagnosis {
     },
     /// The shape or the corners of a board were estimated, but it looks the same after a rotation, so views may show it
     /// either way up.
-    LabelsOpen {
+    AmbiguousLabels {
         /// The smallest such rotation, degrees.
         degrees: u32,
     },
@@ -111,14 +111,14 @@ pub enum Diagnosis {
         stretch: BoardStretch,
     },
     /// The lens model folds back or has a pole within the image.
-    LensEnds {
+    NonMonotonicLens {
         /// The camera.
         camera: usize,
         /// The radius and the extent of corners and image.
-        end: LensEnd,
+        end: LensLimit,
     },
     /// Outliers have something in common.
-    GrossErrors(Finding),
+    CommonOutliers(Finding),
     /// Estimating a quantity that was taken as given explains the residuals.
     Remedied {
         /// The camera whose views show it.
@@ -151,10 +151,10 @@ impl Diagnosis {
     pub fn is_failure(&self) -> bool {
         matches!(
             self,
-            Self::ForeignCamera { .. }
-                | Self::AbsurdFit { .. }
-                | Self::ManyLeftOut { .. }
-                | Self::ManyPanelsLeftOut { .. }
+            Self::WrongCamera { .. }
+                | Self::UnusableFit { .. }
+                | Self::ManyExcluded { .. }
+                | Self::ManyPanelsExcluded { .. }
                 | Self::ChangedCamera { .. }
         )
     }
@@ -163,12 +163,13 @@ impl Diagnosis {
     /// residuals.
     pub fn misfit_of(&self) -> Option<usize> {
         match *self {
-            Self::AbsurdFit { camera, .. }
+            Self::UnusableFit { camera, .. }
             | Self::PoorFit { camera, .. }
             | Self::LackOfFit(LackOfFit::Lens { camera, .. }) => Some(camera),
-            Self::Remedied { camera, remedy: Remedy { instead: Instead::Model(_), .. } } => {
-                Some(camera)
-            }
+            Self::Remedied {
+                camera,
+                remedy: Remedy { alternative: Alternative::Model(_), .. },
+            } => Some(camera),
             _ => None,
         }
     }
@@ -186,7 +187,7 @@ impl Diagnosis {
     /// Whether this diagnosis explains the residuals of its camera at least as well as a remedy.
     fn explains(&self, (camera, remedy): &(usize, Remedy)) -> bool {
         let is_shape =
-            matches!(self, Self::StretchedBoard { .. }) && remedy.instead == Instead::Shape;
+            matches!(self, Self::StretchedBoard { .. }) && remedy.alternative == Alternative::Shape;
         let is_better = |(of, left_px)| of == *camera && (is_shape || left_px <= remedy.to_px);
         self.of_state().is_some_and(is_better)
     }
@@ -205,8 +206,8 @@ impl Calibration {
             said.iter_mut().for_each(|said| own.refine(found, said));
         }
         said.extend(own.open_labels());
-        if let (true, Some((other, rms_px))) = (own.is_single(), own.other_minimum(found)) {
-            said.push(Diagnosis::OtherMinimum { camera: 0, other, rms_px });
+        if let (true, Some((other, rms_px))) = (own.is_single(), own.second_minimum(found)) {
+            said.push(Diagnosis::SecondMinimum { camera: 0, other, rms_px });
         }
         said
     }
@@ -216,7 +217,7 @@ impl Calibration {
         let is_of_place = self.board_shape || self.measure_target;
         let maps = self.symmetries.iter().flatten().filter(|_| is_of_place);
         let degrees = maps.map(|map| map.angle_rad().to_degrees().round() as u32).min()?;
-        Some(Diagnosis::LabelsOpen { degrees })
+        Some(Diagnosis::AmbiguousLabels { degrees })
     }
 
     /// Replaces the values of a change or a stretch from one linear step by those of a full calibration.
@@ -249,7 +250,7 @@ impl Calibration {
     }
 
     /// The camera of another minimum with only slightly larger residuals, if the model has several minima.
-    fn other_minimum(&self, found: &Estimate) -> Option<(Camera, f64)> {
+    fn second_minimum(&self, found: &Estimate) -> Option<(Camera, f64)> {
         let model = self.cameras[0].intrinsics.model()?;
         let own = found.cameras.first()?;
         let starts = 0..model.starts().len();
@@ -287,23 +288,24 @@ impl Estimate {
 fn said(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
     let cameras = || found.cameras.iter().enumerate();
     let foreign = cameras().filter(|(_, camera)| {
-        let is_known = camera.model.is_none() && camera.found().next().is_none();
+        let is_known = camera.model.is_none() && camera.estimated_parameters().next().is_none();
         is_known && camera.inlier_rms_px() > FOREIGN_PART * f64::from(camera.camera.width)
     });
     let foreign =
-        foreign.map(|(camera, of)| Diagnosis::ForeignCamera { camera, rms_px: of.inlier_rms_px() });
+        foreign.map(|(camera, of)| Diagnosis::WrongCamera { camera, rms_px: of.inlier_rms_px() });
     let absurd = cameras().filter(|(_, camera)| camera.model.is_some() && is_absurd(camera));
     let absurd =
-        absurd.map(|(camera, of)| Diagnosis::AbsurdFit { camera, rms_px: of.inlier_rms_px() });
-    let ends = cameras()
-        .filter_map(|(camera, of)| Some(Diagnosis::LensEnds { camera, end: of.lens_end()? }));
+        absurd.map(|(camera, of)| Diagnosis::UnusableFit { camera, rms_px: of.inlier_rms_px() });
+    let ends = cameras().filter_map(|(camera, of)| {
+        Some(Diagnosis::NonMonotonicLens { camera, end: of.lens_limit()? })
+    });
     let late = cameras().filter(|(_, of)| of.delay != 0);
-    let late = late.map(|(camera, of)| Diagnosis::Late { camera, frames: of.delay });
+    let late = late.map(|(camera, of)| Diagnosis::DelayedCamera { camera, frames: of.delay });
     let rotated = cameras().filter_map(|(camera, of)| {
         Some(Diagnosis::LabelsRotated { camera, rotation: of.label_rotation? })
     });
     let late = late.chain(rotated);
-    let gross = found.findings.iter().cloned().map(Diagnosis::GrossErrors);
+    let gross = found.findings.iter().cloned().map(Diagnosis::CommonOutliers);
     let open = cameras().zip(alone).filter(|((_, of), _)| !of.ill_conditioned.is_empty());
     let open = open.map(|((camera, of), alone)| Diagnosis::IllConditioned {
         camera,
@@ -314,16 +316,18 @@ fn said(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
     let causes = causes(found, alone, &mut states);
     let failures: Vec<Diagnosis> = foreign
         .chain(absurd)
-        .chain(many_left_out(found))
-        .chain(many_panels_left_out(found))
+        .chain(many_excluded(found))
+        .chain(many_panels_excluded(found))
         .collect();
     // If the model does not fit the lens, single images are not to blame.
     let misfits: BTreeSet<usize> =
         failures.iter().chain(&causes).filter_map(Diagnosis::misfit_of).collect();
     let is_of_view = |said: &Diagnosis| match said {
-        Diagnosis::GrossErrors(Finding {
-            shared: Shared::View { camera, .. }, left_out, ..
-        }) => misfits.contains(camera) && !left_out,
+        Diagnosis::CommonOutliers(Finding {
+            pattern: OutlierPattern::View { camera, .. },
+            is_excluded,
+            ..
+        }) => misfits.contains(camera) && !is_excluded,
         _ => false,
     };
     let gross = gross.filter(|said| !is_of_view(said));
@@ -355,28 +359,28 @@ fn leaves_patterns(state: &Diagnosis) -> bool {
 }
 
 /// The diagnosis that too many views of estimated cameras were excluded.
-fn many_left_out(found: &Estimate) -> Option<Diagnosis> {
+fn many_excluded(found: &Estimate) -> Option<Diagnosis> {
     let frames: BTreeSet<&str> = found.frames.iter().map(|frame| frame.name.as_str()).collect();
     let whole = found.excluded.iter().filter(|out| out.panel.is_none());
     let is_rig = found.cameras.len() > 1;
-    let left_out = match is_rig {
+    let excluded = match is_rig {
         true => {
             let names: BTreeSet<&str> = whole.map(|out| out.view.as_str()).collect();
             names.difference(&frames).count()
         }
         false => whole.count(),
     };
-    let all = found.frames.len() + left_out;
+    let all = found.frames.len() + excluded;
     let is_sought = found.cameras.iter().any(|camera| camera.model.is_some());
-    let is_many = left_out as f64 > MOST_LEFT_OUT * all as f64;
-    (is_sought && is_many).then_some(Diagnosis::ManyLeftOut { left_out, all })
+    let is_many = excluded as f64 > MAX_EXCLUDED * all as f64;
+    (is_sought && is_many).then_some(Diagnosis::ManyExcluded { excluded, all })
 }
 
 /// The diagnosis that too many corners were excluded with their panels, as when one of several boards has another size.
-fn many_panels_left_out(found: &Estimate) -> Option<Diagnosis> {
-    let excluded = found.excluded.iter().filter(|out| out.panel.is_some());
-    let excluded: usize = excluded.map(|out| out.corners).sum();
-    let (mut outliers, mut all) = (0, excluded);
+fn many_panels_excluded(found: &Estimate) -> Option<Diagnosis> {
+    let of_panels = found.excluded.iter().filter(|out| out.panel.is_some());
+    let on_panels: usize = of_panels.map(|out| out.corners).sum();
+    let (mut outliers, mut all) = (0, on_panels);
     for view in found.cameras.iter().flat_map(|camera| &camera.views) {
         let mut of_panels: BTreeMap<PanelRef, (usize, usize)> = BTreeMap::new();
         for corner in &view.corners {
@@ -390,9 +394,9 @@ fn many_panels_left_out(found: &Estimate) -> Option<Diagnosis> {
         let several = of_panels.values().filter(|_| of_panels.len() > 1);
         outliers += several.filter(is_whole).map(|(seen, _)| seen).sum::<usize>();
     }
-    let left_out = excluded + outliers;
-    let is_many = left_out as f64 > MOST_LEFT_OUT * all as f64;
-    is_many.then_some(Diagnosis::ManyPanelsLeftOut { left_out, all })
+    let excluded = on_panels + outliers;
+    let is_many = excluded as f64 > MAX_EXCLUDED * all as f64;
+    is_many.then_some(Diagnosis::ManyPanelsExcluded { excluded, all })
 }
 
 /// The causes of residuals that are not noise. Removes the states that a remedy explains better.
@@ -402,12 +406,15 @@ fn causes(found: &Estimate, alone: &[Alone], states: &mut Vec<Diagnosis>) -> Vec
         Some((camera, alone.remedy(found)?))
     });
     let mut remedies: Vec<(usize, Remedy)> = remedies.collect();
-    let of = |instead: Instead| move |(_, remedy): &(usize, Remedy)| remedy.instead == instead;
+    let of = |alternative: Alternative| {
+        move |(_, remedy): &(usize, Remedy)| remedy.alternative == alternative
+    };
     // A wrong camera shifts everything else too.
-    if remedies.iter().any(of(Instead::Camera)) {
-        remedies.retain(of(Instead::Camera));
+    if remedies.iter().any(of(Alternative::Camera)) {
+        remedies.retain(of(Alternative::Camera));
     }
-    let is_of_model = |(_, remedy): &&(usize, Remedy)| matches!(remedy.instead, Instead::Model(_));
+    let is_of_model =
+        |(_, remedy): &&(usize, Remedy)| matches!(remedy.alternative, Alternative::Model(_));
     states.retain(|state| {
         let is_worse = |of: &(usize, Remedy)| {
             state.of_state().is_some_and(|(camera, px)| camera == of.0 && px > of.1.to_px)
@@ -417,18 +424,18 @@ fn causes(found: &Estimate, alone: &[Alone], states: &mut Vec<Diagnosis>) -> Vec
     remedies.retain(|remedy| !states.iter().any(|state| state.explains(remedy)));
     // Report the one board and the one target only once.
     let mut seen = Vec::new();
-    remedies.retain(|(_, Remedy { instead, .. })| {
-        let is_shared = matches!(instead, Instead::Shape | Instead::Panels);
-        let is_first = !seen.contains(instead);
-        seen.push(*instead);
+    remedies.retain(|(_, Remedy { alternative, .. })| {
+        let is_shared = matches!(alternative, Alternative::Shape | Alternative::Panels);
+        let is_first = !seen.contains(alternative);
+        seen.push(*alternative);
         is_first || !is_shared
     });
     let is_of_target = |misfit: &&LackOfFit| matches!(misfit, LackOfFit::Target { .. });
     let of_target: Vec<&LackOfFit> = found.lack_of_fit.iter().filter(is_of_target).collect();
     // For displaced panels, their corners describe most of it.
-    let panels = remedies.iter().any(of(Instead::Panels)) && !of_target.is_empty();
+    let panels = remedies.iter().any(of(Alternative::Panels)) && !of_target.is_empty();
     if panels {
-        remedies.retain(|remedy| !of(Instead::Panels)(remedy));
+        remedies.retain(|remedy| !of(Alternative::Panels)(remedy));
     }
     let misfits: Vec<&LackOfFit> = match (panels, remedies.is_empty()) {
         (true, _) => of_target,

@@ -5,9 +5,9 @@
 //! 1. `one_state` tests whether the views show one camera in one state, and the board as described.
 //! 2. `model_selection` tries alternatives that may explain a lack of fit, and smaller models that may suffice.
 //! 3. `diagnosis` collects the problems, their causes and remedies.
-//! 4. `words` formats them as sentences.
+//! 4. `messages` formats them as sentences.
 
 pub(crate) mod diagnosis;
+pub(crate) mod messages;
 pub(crate) mod model_selection;
 pub(crate) mod one_state;
-pub(crate) mod words;

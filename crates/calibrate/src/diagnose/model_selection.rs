@@ -10,7 +10,7 @@ use crate::adjust::lack_of_fit::{MATTERS, SIGNIFICANT, deviate_of_f};
 use crate::estimate::values::{CameraEstimate, Estimate};
 use crate::input::calibration::{Calibration, CameraViews, Intrinsics};
 use crate::input::observation::View;
-use crate::input::panel::PanelPlace;
+use crate::input::panel::PanelPrior;
 use crate::input::sample::evenly;
 use crate::model::Model;
 use crate::problem::whitening::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
@@ -38,7 +38,7 @@ pub(super) const FOREIGN_PART: f64 = 0.005;
 #[non_exhaustive]
 pub struct Remedy {
     /// The quantity that was estimated instead of being taken as given.
-    pub instead: Instead,
+    pub alternative: Alternative,
     /// RMS residual per axis without the remedy, outliers excluded, px.
     pub from_px: f64,
     /// RMS residual per axis with the remedy, outliers excluded, px.
@@ -48,7 +48,7 @@ pub struct Remedy {
 /// The quantity to estimate instead of taking it as given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Instead {
+pub enum Alternative {
     /// The lens, with this richer model.
     Model(Model),
     /// The deviation of the board from a plane.
@@ -105,15 +105,15 @@ impl Calibration {
         let models = model
             .richer()
             .iter()
-            .map(|&model| (Instead::Model(model), trial.of_intrinsics(model).adjusted().ok()));
+            .map(|&model| (Alternative::Model(model), trial.of_intrinsics(model).adjusted().ok()));
         // A board cannot be bent so far that nothing fits.
         let bends = self.panels.len() == 1 && !self.board_shape && !is_absurd(&found.cameras[0]);
         let shape =
-            bends.then(|| (Instead::Shape, trial.clone().board_shape(true).adjusted().ok()));
+            bends.then(|| (Alternative::Shape, trial.clone().board_shape(true).adjusted().ok()));
         let shows_several = trial.cameras[0].views.iter().any(|view| view.sightings.len() > 1);
-        let places = shows_several.then(|| (Instead::Panels, trial.with_panels_found()));
+        let places = shows_several.then(|| (Alternative::Panels, trial.with_panels_found()));
         let tried = shape.into_iter().chain(models).chain(places);
-        let tried = tried.filter_map(|(instead, other)| Some((instead, other?)));
+        let tried = tried.filter_map(|(alternative, other)| Some((alternative, other?)));
         let from_px = found.inlier_rms_px();
         let best = best(&tried_on, tried).filter(|remedy| remedy.to_px < from_px)?;
         Some(Remedy { from_px, ..best })
@@ -126,9 +126,9 @@ impl Calibration {
         let of_lens = |(i, value): (usize, f64)| i < PROJECTION_PARAMETERS.len() || value != 0.0;
         let near = Intrinsics::Near { camera: camera.clone(), free: values.map(of_lens).collect() };
         let bent = (self.panels.len() == 1).then(|| self.clone().board_shape(true).adjusted().ok());
-        let bent = bent.flatten().map(|other| (Instead::Shape, other));
+        let bent = bent.flatten().map(|other| (Alternative::Shape, other));
         let other = self.of_intrinsics(near).board_shape(false).adjusted().ok();
-        best(found, bent.into_iter().chain(other.map(|other| (Instead::Camera, other))))
+        best(found, bent.into_iter().chain(other.map(|other| (Alternative::Camera, other))))
     }
 
     /// The estimate with the poses of the panels as the views determine them.
@@ -137,7 +137,7 @@ impl Calibration {
         let views = self.cameras[0].views.iter().enumerate();
         let views = views.map(|(index, view)| View { name: format!("{index:06}"), ..view.clone() });
         let panels = self.of_views(views.collect()).refine_panels(true).adjusted().ok()?.panels;
-        let stated = |place: &PanelPlace| place.target_from_panel.into();
+        let stated = |place: &PanelPrior| place.target_from_panel.into();
         let panels = panels.iter().map(stated).collect();
         Self { panels, ..self.clone() }.adjusted().ok()
     }
@@ -149,7 +149,7 @@ impl Calibration {
             let alone = self.alone(index, &self.panels);
             let is_known = matches!(self.cameras[index].intrinsics, Intrinsics::Known(_));
             let remedy = || alone.remedy(&alone.adjusted().ok()?);
-            is_known && remedy().is_some_and(|remedy| remedy.instead == Instead::Camera)
+            is_known && remedy().is_some_and(|remedy| remedy.alternative == Alternative::Camera)
         };
         match self.cameras.len() {
             1 => Vec::new(),
@@ -206,11 +206,11 @@ pub(super) fn is_explained(found: &Estimate) -> bool {
     found.common_px.is_some_and(|common| of_noise(common) > EXPLAINED)
 }
 
-fn best(found: &Estimate, tried: impl Iterator<Item = (Instead, Estimate)>) -> Option<Remedy> {
+fn best(found: &Estimate, tried: impl Iterator<Item = (Alternative, Estimate)>) -> Option<Remedy> {
     let from_px = found.inlier_rms_px();
-    let better = tried.filter_map(|(instead, other)| {
-        let gain = gain(found, &other, instead)?;
-        Some((gain, Remedy { instead, from_px, to_px: other.inlier_rms_px() }))
+    let better = tried.filter_map(|(alternative, other)| {
+        let gain = gain(found, &other, alternative)?;
+        Some((gain, Remedy { alternative, from_px, to_px: other.inlier_rms_px() }))
     });
     let better: Vec<_> = better.collect();
     let most = better.iter().map(|(gain, _)| *gain).fold(0.0, f64::max);
@@ -221,7 +221,7 @@ fn best(found: &Estimate, tried: impl Iterator<Item = (Instead, Estimate)>) -> O
 /// The factor by which the mean square residual shrinks; `None` where that is not significant or
 /// does not matter. Outliers of the better fit count as a residual at the outlier limit in both, so
 /// that neither wild corners nor calling more corners wild is a gain.
-fn gain(found: &Estimate, other: &Estimate, instead: Instead) -> Option<f64> {
+fn gain(found: &Estimate, other: &Estimate, alternative: Alternative) -> Option<f64> {
     let squares = |estimate: &Estimate| -> Vec<f64> {
         estimate.corners().map(|corner| corner.residual.length_squared()).collect()
     };
@@ -231,9 +231,9 @@ fn gain(found: &Estimate, other: &Estimate, instead: Instead) -> Option<f64> {
         let squares = squares(estimate);
         squares.iter().map(|square| square.min(most)).sum::<f64>() / squares.len() as f64
     };
-    let of_panels = match instead {
-        Instead::Panels => 6.0 * (panel_count(other) - 1.0),
-        Instead::Model(_) | Instead::Shape | Instead::Camera => 0.0,
+    let of_panels = match alternative {
+        Alternative::Panels => 6.0 * (panel_count(other) - 1.0),
+        Alternative::Model(_) | Alternative::Shape | Alternative::Camera => 0.0,
     };
     let unknowns = |estimate: &Estimate| estimate.unknown_count() as f64;
     let frames = |estimate: &Estimate| estimate.frames.len();
@@ -243,10 +243,10 @@ fn gain(found: &Estimate, other: &Estimate, instead: Instead) -> Option<f64> {
         - unknowns(other)
         - of_panels
         - 6.0 * frames(other) as f64;
-    let is_sure = deviate_of_f((gain - 1.0) * freedom / more, more, freedom) > SIGNIFICANT;
+    let is_confirmed = deviate_of_f((gain - 1.0) * freedom / more, more, freedom) > SIGNIFICANT;
     let is_of_all = frames(other) >= frames(found);
     let is_smaller = other.inlier_rms_px() < found.inlier_rms_px();
-    (is_of_all && is_sure && is_smaller && gain > 1.0 + MATTERS * MATTERS).then_some(gain)
+    (is_of_all && is_confirmed && is_smaller && gain > 1.0 + MATTERS * MATTERS).then_some(gain)
 }
 
 /// Number of panels that were seen.
@@ -270,7 +270,8 @@ fn fits_as_well(smaller: &Estimate, found: &Estimate) -> bool {
             count += 2.0;
         }
     }
-    let parameters = |estimate: &Estimate| estimate.cameras[0].found().count() as f64;
+    let parameters =
+        |estimate: &Estimate| estimate.cameras[0].estimated_parameters().count() as f64;
     let less = parameters(found) - parameters(smaller);
     let freedom = count - parameters(found) - 6.0 * found.frames.len() as f64;
     let f_ratio = (other - own).max(0.0) / less / (own / freedom);

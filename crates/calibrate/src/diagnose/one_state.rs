@@ -17,27 +17,27 @@ use crate::uncertainty::state_equations::{
     Candidate, Column, Effect, Fit, StateEquations, significance,
 };
 use deltille_core::camera::Camera;
-use deltille_core::statistics::f_chance;
+use deltille_core::statistics::f_p_value;
 
 /// Significance level of each of the three diagnoses, 1 % for all; the level for a change covers all its positions
 /// together.
 const SIGNIFICANT: f64 = 0.01 / 3.0;
 
 /// Least number of views before and after a change: two, and one to test them.
-const LEAST_VIEWS: usize = 3;
+const MIN_VIEWS: usize = 3;
 
 /// Greatest fraction of the squares that displacements during readout may leave, so that the residual halves. Another
 /// lens model and a bent board leave most of their pattern in other directions.
-const MOST_LEFT: f64 = 0.25;
+const MAX_LEFT: f64 = 0.25;
 
 /// Least displacement at the edge of the image that counts as a change, in standard deviations of a corner: that of an
 /// outlier. Smaller changes, such as those of a lens that warms up, are covered by the uncertainties, see
 /// [`crate::uncertainty::halves`].
-const LEAST_CHANGE: f64 = OUTLIER_SIGMA;
+const MIN_CHANGE: f64 = OUTLIER_SIGMA;
 
 /// Least stretch that implies another board or a print scaled to its page: printers feed paper with errors of a few
 /// tenths of a per cent.
-const LEAST_STRETCH: f64 = 0.005;
+const MIN_STRETCH: f64 = 0.005;
 
 /// Limit of the sum of three squares beyond which a single view shows a displacement: exceeded once in a thousand
 /// views.
@@ -166,7 +166,7 @@ impl State {
                 ChangedIntrinsic::Focal => (camera.focal_px.x, f64::from(camera.width) / 2.0),
                 ChangedIntrinsic::CentreX | ChangedIntrinsic::CentreY => (1.0, 1.0),
             };
-            if at_edge * effect.value.abs() < LEAST_CHANGE * left_px {
+            if at_edge * effect.value.abs() < MIN_CHANGE * left_px {
                 return None;
             }
             // The fit describes the camera of the first group.
@@ -226,7 +226,7 @@ pub(crate) fn after(first: usize, count: usize) -> Vec<f64> {
 /// The most significant change, if it is significant.
 fn step(equations: &StateEquations) -> Option<Step> {
     let count = equations.count();
-    let places = LEAST_VIEWS..(count + 1).saturating_sub(LEAST_VIEWS);
+    let places = MIN_VIEWS..(count + 1).saturating_sub(MIN_VIEWS);
     let tried = (places.len() * ChangedIntrinsic::ALL.len()) as f64;
     let all = places.flat_map(|first| ChangedIntrinsic::ALL.map(|intrinsic| (intrinsic, first)));
     let of = |(intrinsic, first): (ChangedIntrinsic, usize)| {
@@ -269,8 +269,8 @@ fn shutter(equations: &StateEquations, changed: Option<&Step>) -> Option<Rolling
         return None;
     }
     let f_ratio = (plain.left - moving.left) / unknowns / moving.variance();
-    let significance = f_chance(f_ratio, unknowns, moving.freedom);
-    if significance > SIGNIFICANT || moving.variance() > MOST_LEFT * plain.variance() {
+    let significance = f_p_value(f_ratio, unknowns, moving.freedom);
+    if significance > SIGNIFICANT || moving.variance() > MAX_LEFT * plain.variance() {
         return None;
     }
     let moves = equations.each(&columns(), &moving, &Candidate::SHUTTER)?;
@@ -288,7 +288,7 @@ fn shutter(equations: &StateEquations, changed: Option<&Step>) -> Option<Rolling
 
 /// The stretch, and whether the columns of the board explain most of the squares.
 fn stretch(equations: &StateEquations) -> Option<(BoardStretch, bool)> {
-    if !equations.is_of_one_panel || equations.count() < LEAST_VIEWS {
+    if !equations.is_of_one_panel || equations.count() < MIN_VIEWS {
         return None;
     }
     let columns = base(equations);
@@ -297,9 +297,9 @@ fn stretch(equations: &StateEquations) -> Option<(BoardStretch, bool)> {
     let effect = fit.effect(columns.len() - Candidate::SHEET.len(), 1.0)?;
     let significance = significance(effect);
     let ratio = (1.0 + effect.value) / (1.0 - effect.value);
-    let is_large = (ratio - 1.0).abs() > LEAST_STRETCH;
+    let is_large = (ratio - 1.0).abs() > MIN_STRETCH;
     let plain = equations.fit(&equations.camera())?;
-    let is_most = fit.variance() < MOST_LEFT * plain.variance();
+    let is_most = fit.variance() < MAX_LEFT * plain.variance();
     let left_px = equations.px() * fit.variance().sqrt();
     let found = BoardStretch { ratio, sd: 2.0 * effect.sd, significance, left_px };
     (significance < SIGNIFICANT && is_large).then_some((found, is_most))

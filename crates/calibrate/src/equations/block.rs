@@ -13,16 +13,15 @@ use crate::problem::shape;
 use crate::problem::unknowns::{Block, CameraUnknowns};
 use crate::problem::whitening::Whitening;
 use deltille_core::camera::{
-    Lens, MAX_PARAMETERS, MOST_TOUCHED, PROJECTION_PARAMETERS, Pose, Projection,
+    Lens, MAX_PARAMETERS, MAX_TOUCHED, PROJECTION_PARAMETERS, Pose, Projection,
 };
 
 /// Largest number of columns that a corner depends on: parameters and pose of a camera, poses of a panel, a target and
 /// a frame, and a shape.
-const LONGEST_ROW: usize = MOST_OF_LENS + 24 + shape::COUNT;
+const LONGEST_ROW: usize = MAX_OF_LENS + 24 + shape::COUNT;
 
 /// Largest number of camera parameters that a corner depends on.
-const MOST_OF_LENS: usize =
-    if MAX_PARAMETERS > MOST_TOUCHED { MAX_PARAMETERS } else { MOST_TOUCHED };
+const MAX_OF_LENS: usize = if MAX_PARAMETERS > MAX_TOUCHED { MAX_PARAMETERS } else { MAX_TOUCHED };
 
 /// The columns of a block seen by a spline, and the columns that each of its corners depends on.
 struct Support {

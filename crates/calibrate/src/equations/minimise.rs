@@ -8,13 +8,13 @@ use crate::problem::whitening::Whitening;
 use deltille_core::damping::Damping;
 
 /// Most accepted steps; problems with a minimum take ten to forty.
-const MOST_STEPS: usize = 200;
+const MAX_STEPS: usize = 200;
 
 /// Initial damping.
 const DAMPING: f64 = 1e-4;
 
 /// Largest damping: beyond it no step lowers the cost.
-const MOST_DAMPING: f64 = 1e12;
+const MAX_DAMPING: f64 = 1e12;
 
 /// The accuracy at which the search ends. A step expected to lower the cost by δ² variances moves no unknown by more
 /// than δ of its standard deviations, however many corners there are; below that the search ends.
@@ -57,7 +57,7 @@ pub(crate) fn minimise(
     let mut best = Minimum { problem, normal, layout, steps: 0 };
     let mut damping = Damping::from(DAMPING);
     let coordinates = 2.0 * best.problem.count() as f64;
-    while best.steps < MOST_STEPS && damping.part() < MOST_DAMPING {
+    while best.steps < MAX_STEPS && damping.part() < MAX_DAMPING {
         if best.problem.stop.is_raised() {
             return None;
         }

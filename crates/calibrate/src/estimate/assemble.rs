@@ -17,7 +17,7 @@ use crate::error::CalibrationError;
 use crate::input::calibration::{Calibration, CameraViews};
 use crate::input::loss::Loss;
 use crate::input::order::in_order;
-use crate::input::panel::{PanelPlace, PanelRef};
+use crate::input::panel::{PanelPrior, PanelRef};
 use crate::matrix::Matrix;
 use crate::problem::bundle::Problem;
 use crate::problem::corner_map::CornerMap;
@@ -80,7 +80,7 @@ impl Estimate {
             camera
         });
         let cameras: Vec<CameraEstimate> = cameras.collect();
-        let panels = problem.panels.iter().zip(&layout.panels).map(|(panel, first)| PanelPlace {
+        let panels = problem.panels.iter().zip(&layout.panels).map(|(panel, first)| PanelPrior {
             target_from_panel: panel.target_from_panel,
             covariance: first.map(|first| {
                 std::array::from_fn(|i| std::array::from_fn(|j| covariance[(first + i, first + j)]))
@@ -274,14 +274,14 @@ fn projection(
 
 /// Least sum of the weights of a corner's observations for a measured position: a view has two coordinates, a position
 /// three.
-const LEAST_VIEWS: f64 = 2.0;
+const MIN_VIEWS: f64 = 2.0;
 
 /// Least mean weight of these observations: a majority.
-const LEAST_WEIGHT: f64 = 0.5;
+const MIN_WEIGHT: f64 = 0.5;
 
 /// Whether a position rests on too few effective observations.
 fn rests_on_few(&(weight, count): &(f64, usize)) -> bool {
-    weight < LEAST_VIEWS || weight < LEAST_WEIGHT * count as f64
+    weight < MIN_VIEWS || weight < MIN_WEIGHT * count as f64
 }
 
 /// For each corner, the sum of the weights of its observations and their number. Outliers have no weight; views whose

@@ -113,7 +113,7 @@ mod tests {
         // r = θ (1 − θ²/10) ends at 463 px.
         let ends = fisheye(-0.1);
         let ended = ImageCircle::of(&ends, &disc(&ends, 300.0)).unwrap();
-        assert!((ended.radius_px - ends.steady_px().unwrap()).abs() < 1.0, "{ended:?}");
+        assert!((ended.radius_px - ends.monotonic_px().unwrap()).abs() < 1.0, "{ended:?}");
         let perspective = Lens::BrownConrady(BrownConrady::default());
         let perspective = Camera::centred(1200, 1200, 900.0, perspective);
         assert_eq!(ImageCircle::of(&perspective, &disc(&perspective, 590.0)), None);

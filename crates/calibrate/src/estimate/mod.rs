@@ -3,7 +3,7 @@
 //! Input: the settled adjustment. Output: a [`values::Estimate`].
 //!
 //! 1. `values` are cameras, targets, frames, views and corners with residuals.
-//! 2. `target_map` (measured corners), `coverage` (where corners were seen), `lens_end` and `image_circle` (extent of
+//! 2. `target_map` (measured corners), `coverage` (where corners were seen), `lens_limit` and `image_circle` (extent of
 //!    the lens) are parts of it.
 //! 3. `uncertainty_map` is the projection uncertainty of a camera over its image.
 //! 4. `assemble` builds the estimate.
@@ -11,7 +11,7 @@
 pub(crate) mod assemble;
 pub(crate) mod coverage;
 pub(crate) mod image_circle;
-pub(crate) mod lens_end;
+pub(crate) mod lens_limit;
 pub(crate) mod target_map;
 pub(crate) mod uncertainty_map;
 pub(crate) mod values;

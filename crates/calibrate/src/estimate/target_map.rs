@@ -6,8 +6,8 @@ use glam::DVec3;
 
 use crate::input::observation::Sighting;
 use crate::input::panel::PanelRef;
-use deltille_core::statistics::chi_squared_chance;
-use deltille_core::targets::{MeasuredPlace, Target};
+use deltille_core::statistics::chi_squared_p_value;
+use deltille_core::targets::{MeasuredPosition, Target};
 
 /// The positions of the corners of a target as measured by the views.
 ///
@@ -47,7 +47,7 @@ pub struct CornerOffset {
 
 /// Least number of views of a corner for measuring to pay: the remaining noise of its position is then a third of that
 /// of a single view, less than the half at which a pattern matters.
-pub const LEAST_TO_MEASURE: usize = 8;
+pub const MIN_VIEWS_TO_MEASURE: usize = 8;
 
 /// Probability that any corner of a perfect target is reported as off.
 const FALSE_ALARM: f64 = 0.01;
@@ -79,7 +79,7 @@ impl TargetMap {
                 let Some(found) = self.corner(label) else { continue };
                 let place = found.panel_mm + found.offset_mm;
                 let c = found.covariance_mm2;
-                corner.measured = Some(MeasuredPlace {
+                corner.measured = Some(MeasuredPosition {
                     offset_mm: place - plan.apply(corner.target_mm),
                     covariance_mm2: [c[0][0], c[0][1], c[0][2], c[1][1], c[1][2], c[2][2]],
                 });
@@ -126,7 +126,7 @@ impl TargetMap {
 
     /// Whether the offset of a corner is significant.
     pub fn is_significant(&self, corner: &CornerOffset) -> bool {
-        corner.chance() < FALSE_ALARM / self.corners.len().max(1) as f64
+        corner.p_value() < FALSE_ALARM / self.corners.len().max(1) as f64
     }
 }
 
@@ -136,11 +136,11 @@ impl CornerOffset {
     }
 
     /// Probability of such an offset for a corner at its planned position.
-    pub fn chance(&self) -> f64 {
+    pub fn p_value(&self) -> f64 {
         let covariance = nalgebra::Matrix3::from_fn(|i, j| self.covariance_mm2[i][j]);
         let offset = nalgebra::Vector3::from(self.offset_mm.to_array());
         let Some(inverse) = covariance.try_inverse() else { return 1.0 };
-        chi_squared_chance(offset.dot(&(inverse * offset)), 3)
+        chi_squared_p_value(offset.dot(&(inverse * offset)), 3)
     }
 }
 

@@ -23,7 +23,7 @@ pub struct UncertaintyMap {
 }
 
 /// Number of positions along the longer side of an image.
-const PLACES: usize = 24;
+const POSITIONS: usize = 24;
 
 /// Number of corners that suffices for the mean uncertainty over the seen part of the image.
 const ENOUGH_CORNERS: usize = 1000;
@@ -67,7 +67,7 @@ impl CameraEstimate {
         self.covariance_from(source)?;
         self.projection.as_ref()?;
         let size = DVec2::new(f64::from(self.camera.width), f64::from(self.camera.height));
-        let parts = (size * PLACES as f64 / size.max_element()).round().max(DVec2::ONE);
+        let parts = (size * POSITIONS as f64 / size.max_element()).round().max(DVec2::ONE);
         let (columns, rows) = (parts.x as usize, parts.y as usize);
         let sd = |place: usize| {
             let at = DVec2::new((place % columns) as f64, (place / columns) as f64) + 0.5;

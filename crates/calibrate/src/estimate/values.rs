@@ -6,12 +6,12 @@ use std::ops::Range;
 use glam::DVec2;
 
 use super::coverage::Coverage;
-use super::lens_end::LensEnd;
+use super::lens_limit::LensLimit;
 use super::target_map::TargetMap;
 use crate::adjust::finding::Finding;
 use crate::adjust::lack_of_fit::LackOfFit;
 use crate::excluded::Excluded;
-use crate::input::panel::{PanelPlace, PanelRef};
+use crate::input::panel::{PanelPrior, PanelRef};
 use crate::matrix::Matrix;
 use crate::model::Model;
 use crate::problem::roughness::Roughness;
@@ -40,7 +40,7 @@ pub struct Estimate {
     /// Identities of the targets used for the calibration; empty if they are not known.
     pub calibrated_with: Vec<TargetIdentity>,
     /// The panels of all targets; estimated poses have a covariance.
-    pub panels: Vec<PanelPlace>,
+    pub panels: Vec<PanelPrior>,
     /// The shape of the board's sheet, if it was estimated.
     pub shape: Option<BoardShape>,
     /// The positions of the corners of the target, if they were estimated.
@@ -272,10 +272,9 @@ impl Estimate {
     /// Number of estimated unknowns besides the poses of the frames.
     pub(crate) fn unknown_count(&self) -> usize {
         let of_panels = self.panels.iter().filter(|panel| panel.covariance.is_some()).count();
-        let of_cameras = self
-            .cameras
-            .iter()
-            .map(|camera| camera.found().count() + if camera.pose_sd.is_some() { 6 } else { 0 });
+        let of_cameras = self.cameras.iter().map(|camera| {
+            camera.estimated_parameters().count() + if camera.pose_sd.is_some() { 6 } else { 0 }
+        });
         let of_shape = self.shape.map_or(0, |found| found.sd_mm.len());
         let of_targets = self.targets.iter().filter(|target| target.pose_sd.is_some()).count();
         of_cameras.sum::<usize>() + 6 * (of_panels + of_targets) + of_shape
@@ -345,14 +344,14 @@ impl CameraEstimate {
     }
 
     /// The names of the estimated parameters.
-    pub fn found(&self) -> impl Iterator<Item = &str> {
+    pub fn estimated_parameters(&self) -> impl Iterator<Item = &str> {
         self.parameters.iter().filter(|p| p.sd.is_some()).map(|p| p.name.as_str())
     }
 
     /// The fold or pole of the lens model within the image, if there is one.
-    pub fn lens_end(&self) -> Option<LensEnd> {
+    pub fn lens_limit(&self) -> Option<LensLimit> {
         let seen: Vec<DVec2> = self.corners().map(|corner| corner.pixel).collect();
-        LensEnd::of(&self.camera, &seen)
+        LensLimit::of(&self.camera, &seen)
     }
 }
 

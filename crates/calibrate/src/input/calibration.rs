@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 use super::loss::Loss;
 use super::observation::{Sighting, View};
 use super::order::in_order;
-use super::panel::{PanelPlace, PanelRef};
+use super::panel::{PanelPrior, PanelRef};
 use super::reference::Reference;
 use super::weights::Weights;
 use crate::cancel::Stop;
@@ -27,8 +27,8 @@ use deltille_core::targets::{Target, TargetIdentity};
 /// [`of_targets`](Self::of_targets), it also estimates the poses of the targets relative to each other.
 ///
 /// ```
-/// # use deltille_calibrate::{Calibration, CalibrationError, Estimate, Model, PanelPlace, View};
-/// # fn calibrated(panels: Vec<PanelPlace>, left: Vec<View>, right: Vec<View>) -> Result<Estimate, CalibrationError> {
+/// # use deltille_calibrate::{Calibration, CalibrationError, Estimate, Model, PanelPrior, View};
+/// # fn calibrated(panels: Vec<PanelPrior>, left: Vec<View>, right: Vec<View>) -> Result<Estimate, CalibrationError> {
 /// Calibration::new(panels)
 ///     .camera("left", left, Model::Radtan)
 ///     .camera("right", right, Model::KannalaBrandt(4))
@@ -39,7 +39,7 @@ use deltille_core::targets::{Target, TargetIdentity};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
     /// The panels of all targets, one target after the other.
-    pub(crate) panels: Vec<PanelPlace>,
+    pub(crate) panels: Vec<PanelPrior>,
     pub(crate) targets: Vec<TargetPanels>,
     /// Identities of the targets that have a description.
     pub(crate) identities: Vec<TargetIdentity>,
@@ -146,7 +146,7 @@ impl CameraViews {
 impl Calibration {
     /// Creates a calibration with a target of these panels, see [`Reference::panels`](crate::Reference::panels), and
     /// without cameras.
-    pub fn new(panels: impl IntoIterator<Item = impl Into<PanelPlace>>) -> Self {
+    pub fn new(panels: impl IntoIterator<Item = impl Into<PanelPrior>>) -> Self {
         let panels = panels.into_iter().map(Into::into).collect();
         Self::of_targets([(String::new(), panels)])
     }
@@ -157,7 +157,7 @@ impl Calibration {
     ///
     /// Two cameras need not see the same target. If each sees a target of its own, the motion of the rig determines the
     /// poses of the cameras and the targets; the rig must rotate about two axes.
-    pub fn of_targets(targets: impl IntoIterator<Item = (String, Vec<PanelPlace>)>) -> Self {
+    pub fn of_targets(targets: impl IntoIterator<Item = (String, Vec<PanelPrior>)>) -> Self {
         let (mut panels, mut of_targets) = (Vec::new(), Vec::new());
         for (name, of_target) in targets {
             let first = panels.len();
@@ -188,7 +188,7 @@ impl Calibration {
 
     /// Creates a calibration of the photographed target or targets with these panel poses, listed one target after the
     /// other.
-    pub fn of(reference: &Reference, panels: Vec<PanelPlace>) -> Self {
+    pub fn of(reference: &Reference, panels: Vec<PanelPrior>) -> Self {
         let targets = reference.targets();
         // The least accurate of several targets counts.
         let accuracy_mm = targets.iter().map(Target::measured_sd_mm);
@@ -296,7 +296,7 @@ impl Calibration {
     /// Sets a flag that stops the calibration soon after it is raised; [`Self::solve`] then returns
     /// [`CalibrationError::Stopped`].
     #[must_use]
-    pub fn stopped_by(self, flag: Arc<AtomicBool>) -> Self {
+    pub fn cancelled_by(self, flag: Arc<AtomicBool>) -> Self {
         Self { stop: Stop::by(flag), ..self }
     }
 
@@ -306,7 +306,7 @@ impl Calibration {
     }
 
     /// The panels as they were given.
-    pub fn panels(&self) -> &[PanelPlace] {
+    pub fn panels(&self) -> &[PanelPrior] {
         &self.panels
     }
 
@@ -348,7 +348,7 @@ impl Calibration {
 
     /// The calibration of one camera on its own, with these panel poses. Each target in an image becomes a view of its
     /// own.
-    pub(crate) fn alone(&self, camera: usize, panels: &[PanelPlace]) -> Self {
+    pub(crate) fn alone(&self, camera: usize, panels: &[PanelPrior]) -> Self {
         let mut camera = self.cameras[camera].clone();
         if self.targets.len() > 1 {
             camera.views = camera.views.iter().flat_map(|view| self.by_target(view)).collect();

@@ -6,7 +6,7 @@ use super::panel::PanelRef;
 use crate::excluded::{Excluded, Reason};
 
 /// Least number of corners of a panel in a view; with fewer, wrong corners cannot be recognised.
-pub(crate) const LEAST_CORNERS: usize = 6;
+pub(crate) const MIN_CORNERS: usize = 6;
 
 /// A corner of a panel that a camera detected.
 #[derive(Clone, Copy, Debug, PartialEq)]

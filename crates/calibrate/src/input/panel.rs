@@ -51,7 +51,7 @@ impl Serialize for PanelRef {
 
 /// The pose of a panel on its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PanelPlace {
+pub struct PanelPrior {
     /// The pose, from the panel frame to the target frame, mm.
     pub target_from_panel: Pose,
     /// Covariance of rotation (rad) and translation (mm) along the axes of the target, if the pose was measured; `None`
@@ -59,13 +59,13 @@ pub struct PanelPlace {
     pub covariance: Option<[[f64; 6]; 6]>,
 }
 
-impl From<&PanelPose> for PanelPlace {
+impl From<&PanelPose> for PanelPrior {
     fn from(pose: &PanelPose) -> Self {
         Self { target_from_panel: pose.to_pose(), covariance: pose.covariance }
     }
 }
 
-impl From<Pose> for PanelPlace {
+impl From<Pose> for PanelPrior {
     fn from(target_from_panel: Pose) -> Self {
         Self { target_from_panel, covariance: None }
     }

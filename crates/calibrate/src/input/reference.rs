@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::grid::{UntaggedGrid, assume_target};
 use super::observation::{Observation, Sighting, View};
-use super::panel::{PanelPlace, PanelRef};
+use super::panel::{PanelPrior, PanelRef};
 use deltille_core::camera::Pose;
 use deltille_core::detection::{Detection, Grid};
 use deltille_core::lattice::LatticeMap;
@@ -44,7 +44,7 @@ pub enum Reference<'a> {
 
 impl Reference<'_> {
     /// The poses of the panels on the target.
-    pub fn panels(&self) -> Vec<PanelPlace> {
+    pub fn panels(&self) -> Vec<PanelPrior> {
         match self {
             Self::Grid(_) => vec![Pose::IDENTITY.into()],
             Self::Target(_) | Self::Scene(_) => {
@@ -119,7 +119,7 @@ impl Reference<'_> {
 
     /// Whether the labels of a view are certainly those of the target: because of its tags, or because the whole board
     /// is visible.
-    pub fn is_sure_of(&self, view: &View) -> bool {
+    pub fn has_certain_labels(&self, view: &View) -> bool {
         if let Self::Grid(grid) = self {
             let whole = grid.size.map(|[rows, cols]| rows as usize * cols as usize);
             return whole.is_some_and(|count| view.corner_count() >= count);

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use glam::DVec2;
 
-use super::observation::{LEAST_CORNERS, Sighting, View};
+use super::observation::{MIN_CORNERS, Sighting, View};
 use super::reference::Reference;
 use crate::error::CalibrationError;
 use crate::excluded::{Excluded, Reason};
@@ -23,13 +23,13 @@ const MIRRORED_SURE: f64 = 3.09;
 /// The views of detections.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct Shown {
+pub struct ViewSet {
     /// One view for each image, or for each loose board in it.
     pub views: Vec<View>,
     /// Indices of the empty detections.
     pub empty: Vec<usize>,
     /// Indices of the detections that are not of the target or duplicate another image, with the reason.
-    pub left_out: Vec<(usize, Excluded)>,
+    pub excluded: Vec<(usize, Excluded)>,
 }
 
 /// A detection and the name of its view: that of its image, or another. Views of several cameras taken at the same time
@@ -78,13 +78,13 @@ impl<'a> From<&'a (String, Detection)> for Named<'a> {
 pub fn views<'a, N: Into<Named<'a>>>(
     detections: impl IntoIterator<Item = N>,
     reference: &Reference,
-) -> Result<Shown, CalibrationError> {
+) -> Result<ViewSet, CalibrationError> {
     let named: Vec<Named> = detections.into_iter().map(Into::into).collect();
     views_of(&named, reference)
 }
 
 /// The body of [`views`], compiled in this crate only.
-fn views_of(detections: &[Named], reference: &Reference) -> Result<Shown, CalibrationError> {
+fn views_of(detections: &[Named], reference: &Reference) -> Result<ViewSet, CalibrationError> {
     let mut views = Vec::new();
     let mut empty = Vec::new();
     let mut left_out = Vec::new();
@@ -146,7 +146,7 @@ fn views_of(detections: &[Named], reference: &Reference) -> Result<Shown, Calibr
             1 => first,
             _ => CalibrationError::MostWrong { first: Box::new(first), wrong, all },
         }),
-        _ => Ok(Shown { views, empty, left_out }),
+        _ => Ok(ViewSet { views, empty, excluded: left_out }),
     }
 }
 
@@ -176,7 +176,7 @@ fn sightings(
     identities: &[TargetIdentity],
 ) -> Result<Vec<Sighting>, (Option<u32>, String)> {
     let mut sightings = reference.sightings(detection, identities)?;
-    sightings.retain(|sighting| sighting.observations.len() >= LEAST_CORNERS);
+    sightings.retain(|sighting| sighting.observations.len() >= MIN_CORNERS);
     match (is_mirrored(&sightings), sightings.as_slice()) {
         (true, [only]) => Err((reference.panel_id(only.panel), Reason::Mirrored.to_string())),
         (true, _) => Err((None, Reason::Mirrored.to_string())),
@@ -187,14 +187,14 @@ fn sightings(
 /// Whether nearly all corners with two neighbours are mirrored. In an image with two fifths of its corners misplaced,
 /// two fifths of these appear mirrored too, and a panel of a few corners may appear mirrored by chance.
 fn is_mirrored(sightings: &[Sighting]) -> bool {
-    let turns: Vec<f64> = sightings.iter().flat_map(turns).collect();
-    let (count, more) = (turns.len() as f64, turns.iter().sum::<f64>());
+    let rotations: Vec<f64> = sightings.iter().flat_map(rotations).collect();
+    let (count, more) = (rotations.len() as f64, rotations.iter().sum::<f64>());
     more > MIRRORED_MOST * count && more > MIRRORED_SURE * count.sqrt()
 }
 
 /// Orientation of each corner and its neighbours in column and row: 1 if they are mirrored. In an image (y down), rows
 /// and columns as on the print are oriented clockwise.
-fn turns(sighting: &Sighting) -> Vec<f64> {
+fn rotations(sighting: &Sighting) -> Vec<f64> {
     let places: BTreeMap<(i32, i32), DVec2> =
         sighting.observations.iter().map(|o| ((o.row, o.col), o.pixel)).collect();
     let turn = |(&(row, col), &here): (&(i32, i32), &DVec2)| {

@@ -26,14 +26,14 @@ const TAGGED_EDGE_PX: f64 = 15.0;
 const PLAIN_EDGE_PX: f64 = 8.75;
 
 /// Cosine of the largest tilt. Corners are found up to 75°; the limit leaves a margin of 12° for a person.
-const MOST_TILT_COS: f64 = 0.454;
+const MAX_TILT_COS: f64 = 0.454;
 
 /// Margin that the window of the detector needs around a corner, px.
 const MARGIN_PX: f64 = 8.0;
 
 /// Least fraction of the corners inside the image: a board that is cut off is labelled if some tags are whole, and this
 /// fraction determines its pose well enough.
-const LEAST_PART: f64 = 0.5;
+const MIN_PART: f64 = 0.5;
 
 /// A panel of a target.
 #[derive(Clone, Debug)]
@@ -70,7 +70,7 @@ pub(super) struct Body {
     /// The pose `target_from_front`: origin at the centre of the first panel, x to its right, y up, z out of it.
     pub front: Pose,
     /// Rotation from the panel frame to the target frame, for each panel.
-    pub turns: Vec<DMat3>,
+    pub rotations: Vec<DMat3>,
 }
 
 /// A corner that a camera sees, with the number of corners it represents.
@@ -96,9 +96,9 @@ impl Body {
         let &(_, first) = panels.first()?;
         let turn = glam::DQuat::from_mat3(&first.pose.matrix());
         let front = Pose { rotation: turn, translation: first.middle_mm() };
-        let turns = panels.iter().map(|(_, panel)| panel.pose.matrix()).collect();
+        let rotations = panels.iter().map(|(_, panel)| panel.pose.matrix()).collect();
         let panels = panels.into_iter().map(|(index, panel)| BodyPanel::new(index, panel, most));
-        Some(Self { panels: panels.collect(), front, turns })
+        Some(Self { panels: panels.collect(), front, rotations })
     }
 
     /// The corners that a detector finds with the target at a pose: all, or those used for judging. `None` if it finds
@@ -106,7 +106,7 @@ impl Body {
     pub(super) fn seen(&self, camera: &Camera, pose: &Pose, all: bool) -> Option<Vec<Seen>> {
         let mut seen = Vec::new();
         for (index, panel) in self.panels.iter().enumerate() {
-            panel.seen(index, camera, pose, &self.turns[index], all, &mut seen);
+            panel.seen(index, camera, pose, &self.rotations[index], all, &mut seen);
         }
         (!seen.is_empty()).then_some(seen)
     }
@@ -138,7 +138,7 @@ impl BodyPanel {
                 row: corner.row,
                 col: corner.col,
                 panel_mm: corner.panel_mm.extend(0.0),
-                target_mm: panel.place_mm(corner),
+                target_mm: panel.position_mm(corner),
             })
             .collect();
         let around = hull(corners.iter().map(|corner| corner.panel_mm.truncate()).collect());
@@ -195,7 +195,7 @@ impl BodyPanel {
         let chosen = if all { self.corners.len() } else { self.sampled.len() };
         let find = |corner: usize| {
             let point = pose.apply(self.corners[corner].target_mm);
-            if -normal.dot(point) < MOST_TILT_COS * point.length() {
+            if -normal.dot(point) < MAX_TILT_COS * point.length() {
                 return None;
             }
             let at = camera.project_with_derivatives(point)?;
@@ -210,7 +210,7 @@ impl BodyPanel {
         }
         seen.extend((0..chosen).filter_map(|k| find(if all { k } else { self.sampled[k] })));
         let found = (seen.len() - first) as f64;
-        let least = if self.has_tags { LEAST_PART * chosen as f64 } else { chosen as f64 };
+        let least = if self.has_tags { MIN_PART * chosen as f64 } else { chosen as f64 };
         if found < least {
             seen.truncate(first);
         }

@@ -26,7 +26,7 @@ use crate::uncertainty::projection::{by_motion, by_parameters, seen_at, solved};
 use deltille_core::camera::{Camera, PROJECTION_PARAMETERS};
 
 /// Number of positions along the longer side of the image at which projections are judged.
-const PLACES: usize = 16;
+const POSITIONS: usize = 16;
 
 /// Prior standard deviation of each parameter: it shifts projections by this fraction of the longer image side, RMS.
 /// The prior keeps parameters finite that the corners do not determine.
@@ -66,7 +66,7 @@ struct Sums {
 struct Field {
     own: DMatrix<f64>,
     turns_across: DMatrix<f64>,
-    turns: Matrix3<f64>,
+    rotations: Matrix3<f64>,
 }
 
 impl Gain {
@@ -134,7 +134,7 @@ impl Gain {
         for Seen { panel, corner, point, at, weight } in seen {
             row.columns_mut(0, count).copy_from(&by_parameters(at, &self.free));
             if let Some(shape) = &self.shape {
-                let turn = *turn * body.turns[*panel];
+                let turn = *turn * body.rotations[*panel];
                 let place = body.panels[*panel].corners[*corner].panel_mm;
                 for (k, bend) in shape.directions(place).into_iter().enumerate() {
                     let bend = turn * bend;
@@ -158,10 +158,11 @@ impl Gain {
         let count = self.free.len();
         let covariance = inverse(information)?;
         let across = sums.across.columns(0, count).into_owned();
-        let turns = -solved(&sums.motion, &across)?.rows(0, 3).into_owned();
-        let Field { own, turns_across, turns: of_turns } = &self.field;
-        let crossed = turns_across.tr_mul(&turns);
-        let m = own + &crossed + crossed.transpose() + turns.transpose() * of_turns * &turns;
+        let rotations = -solved(&sums.motion, &across)?.rows(0, 3).into_owned();
+        let Field { own, turns_across, rotations: of_turns } = &self.field;
+        let crossed = turns_across.tr_mul(&rotations);
+        let m =
+            own + &crossed + crossed.transpose() + rotations.transpose() * of_turns * &rotations;
         let of_camera = covariance.view((0, 0), (count, count));
         let sum: f64 = m.iter().zip(of_camera.iter()).map(|(m, v)| m * v).sum();
         (sum >= 0.0).then(|| (0.5 * sum).sqrt())
@@ -207,22 +208,22 @@ impl Field {
         let mut field = Self {
             own: DMatrix::zeros(free.len(), free.len()),
             turns_across: DMatrix::zeros(3, free.len()),
-            turns: Matrix3::zeros(),
+            rotations: Matrix3::zeros(),
         };
         for pixel in places(camera) {
             let Some(point) = seen_at(camera, pixel, None) else { continue };
             let Some(at) = camera.project_with_derivatives(point) else { continue };
             let (by_unknowns, motion) = (by_parameters(&at, free), by_motion(&at, point));
-            let turns = motion.fixed_columns::<3>(0).into_owned();
+            let rotations = motion.fixed_columns::<3>(0).into_owned();
             field.own += by_unknowns.transpose() * &by_unknowns;
-            field.turns_across += turns.transpose() * &by_unknowns;
-            field.turns += turns.transpose() * turns;
+            field.turns_across += rotations.transpose() * &by_unknowns;
+            field.rotations += rotations.transpose() * rotations;
             count += 1.0;
         }
         (count > 0.0).then(|| {
             field.own /= count;
             field.turns_across /= count;
-            field.turns /= count;
+            field.rotations /= count;
             field
         })
     }
@@ -231,7 +232,7 @@ impl Field {
 /// Grid of positions over an image, px.
 fn places(camera: &Camera) -> impl Iterator<Item = DVec2> + use<> {
     let size = DVec2::new(camera.width.into(), camera.height.into());
-    let parts = (size * PLACES as f64 / size.max_element()).round().max(DVec2::ONE);
+    let parts = (size * POSITIONS as f64 / size.max_element()).round().max(DVec2::ONE);
     let (columns, rows) = (parts.x as usize, parts.y as usize);
     (0..columns * rows).map(move |place| {
         let at = DVec2::new((place % columns) as f64, (place / columns) as f64) + 0.5;

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! This module opens no file and reads no clock: it takes estimates and returns a pose with its outline, figures and a
-//! sentence. [`Holding`](super::holding::Holding) detects when a person holds the board there.
+//! sentence. [`HoldTracker`](super::holding::HoldTracker) detects when a person holds the board there.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -56,11 +56,11 @@ const STEP: [f64; 6] = [0.08, 0.08, 0.18, 0.15, 0.3, 0.4];
 const HALVINGS: usize = 2;
 
 /// Largest tilt, rad (55°): beyond it boards are neither held nor detected well.
-const MOST_TILT: f64 = 0.96;
+const MAX_TILT: f64 = 0.96;
 
 /// Least reduction of the uncertainty that is worth another view, as a fraction: the fifteenth of equally good images
 /// achieves it.
-const LEAST_GAIN: f64 = 0.03;
+const MIN_GAIN: f64 = 0.03;
 
 /// Proposes views for the calibration of one camera, one after the other.
 ///
@@ -108,7 +108,7 @@ pub struct NextView {
     /// The angle between the board's normal and the line of sight, rad.
     pub tilt_rad: f64,
     /// Direction in the image in which the tilted board recedes, rad, clockwise from right.
-    pub away_rad: f64,
+    pub tilt_direction_rad: f64,
     /// Rotation of the board in its plane, rad, counterclockwise as seen; 0 if its rows are level.
     pub roll_rad: f64,
     /// Projection uncertainty at infinity so far, px: the RMS over the whole image of the standard deviation per axis
@@ -202,7 +202,7 @@ impl Guide {
             at: view.at,
             distance_mm: view.distance_mm,
             tilt: view.tilt_rad,
-            away: view.away_rad,
+            away: view.tilt_direction_rad,
             roll: view.roll_rad,
         });
         Self { refused: placings.collect(), ..self }
@@ -299,10 +299,7 @@ impl Guide {
         let is_far_enough = (nearest..=farthest).contains(&placing.distance_mm);
         let is_in_image = placing.at.cmpge(DVec2::ZERO).all() && placing.at.cmple(DVec2::ONE).all();
         let is_refused = self.refused.iter().any(|refused| placing.is_like(refused));
-        if is_refused
-            || !is_far_enough
-            || !is_in_image
-            || !(0.0..=MOST_TILT).contains(&placing.tilt)
+        if is_refused || !is_far_enough || !is_in_image || !(0.0..=MAX_TILT).contains(&placing.tilt)
         {
             return None;
         }
@@ -375,7 +372,7 @@ impl Guide {
             at: placing.at,
             distance_mm: placing.distance_mm,
             tilt_rad: placing.tilt,
-            away_rad: turned(placing.away),
+            tilt_direction_rad: turned(placing.away),
             roll_rad: turned(placing.roll),
             now_px: None,
             expected_px: None,
@@ -403,7 +400,7 @@ impl NextView {
     pub fn is_enough(&self, until_px: Option<f64>) -> bool {
         match until_px {
             Some(until) => self.now_px.is_some_and(|now| now <= until),
-            None => self.gain().is_some_and(|gain| gain < LEAST_GAIN),
+            None => self.gain().is_some_and(|gain| gain < MIN_GAIN),
         }
     }
 }

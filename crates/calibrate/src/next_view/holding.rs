@@ -14,15 +14,15 @@ use deltille_core::statistics::median;
 
 /// Least overlap of the proposed and the seen outline (intersection over union). For equal squares, a shift by a ninth
 /// of the side leaves 0.8; a person hardly does better, and such a view carries nearly the same information.
-const LEAST_OVERLAP: f64 = 0.7;
+const MIN_OVERLAP: f64 = 0.7;
 
 /// Largest angle between the normal and the proposed one, rad (12°). It distinguishes a facing board from one at the
 /// least proposed tilt.
-const MOST_TURN_RAD: f64 = 0.21;
+const MAX_ROTATION_RAD: f64 = 0.21;
 
 /// Largest motion blur of an edge, px: the standard deviation of a box of this width is a tenth of a pixel, small
 /// compared with the blur of any lens.
-const MOST_SMEAR_PX: f64 = 0.35;
+const MAX_SMEAR_PX: f64 = 0.35;
 
 /// Default exposure time, s: the longest of a webcam at 30 frames per second.
 const EXPOSURE_S: f64 = 1.0 / 30.0;
@@ -35,15 +35,15 @@ const FORGOTTEN_S: f64 = 1.0;
 
 /// Largest accepted blur (standard deviation), px: corners are three times less accurate there than at a blur of one
 /// pixel (`docs/benchmarks.md`, refined corners).
-const MOST_BLUR_PX: f64 = 3.0;
+const MAX_BLUR_PX: f64 = 3.0;
 
 /// Largest standard deviation of corners, px, if the blur is not given: beyond it the image is smeared or dark.
-const MOST_SD_PX: f64 = 0.15;
+const MAX_SD_PX: f64 = 0.15;
 
 /// The state of a board in live detections.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Held {
+pub enum HoldStatus {
     /// No corner is visible.
     Unseen,
     /// The board is elsewhere.
@@ -74,19 +74,19 @@ pub enum Held {
 
 /// Watches whether a board is held as proposed. The caller passes the time of each image, on any clock.
 #[derive(Clone, Debug)]
-pub struct Holding {
+pub struct HoldTracker {
     next: NextView,
     hull: Vec<DVec2>,
     panels: Vec<Pose>,
     exposure_s: f64,
-    held_s: f64,
+    hold_s: f64,
     last: Option<(f64, Corners)>,
     since: Option<f64>,
 }
 
 type Corners = BTreeMap<(PanelRef, i32, i32), DVec2>;
 
-impl Holding {
+impl HoldTracker {
     /// Creates the watch for a proposed view; `panels` are the poses `target_from_panel` of the target's panels, see
     /// [`Reference::panels`](crate::Reference::panels).
     pub fn new(next: &NextView, panels: impl IntoIterator<Item = Pose>) -> Self {
@@ -95,7 +95,7 @@ impl Holding {
             next: next.clone(),
             panels: panels.into_iter().collect(),
             exposure_s: EXPOSURE_S,
-            held_s: HELD_S,
+            hold_s: HELD_S,
             last: None,
             since: None,
         }
@@ -109,16 +109,21 @@ impl Holding {
 
     /// Sets the time for which the board must be held, s; the default is 0.4 s.
     #[must_use]
-    pub fn held_s(self, held_s: f64) -> Self {
-        Self { held_s, ..self }
+    pub fn hold_s(self, hold_s: f64) -> Self {
+        Self { hold_s, ..self }
     }
 
     /// Judges an image taken at a time, s. `blur_px` is the standard deviation of its blur, if it was measured;
     /// otherwise the covariances of the corners show whether it is sharp.
-    pub fn look(&mut self, time_s: f64, view: Option<&View>, blur_px: Option<f64>) -> Held {
+    pub fn observe(
+        &mut self,
+        time_s: f64,
+        view: Option<&View>,
+        blur_px: Option<f64>,
+    ) -> HoldStatus {
         let Some(view) = view.filter(|view| view.corner_count() > 0) else {
             (self.last, self.since) = (None, None);
-            return Held::Unseen;
+            return HoldStatus::Unseen;
         };
         let corners = view.sightings.iter().flat_map(|sighting| {
             sighting.observations.iter().map(|o| ((sighting.panel, o.row, o.col), o.pixel))
@@ -129,10 +134,10 @@ impl Holding {
         match held {
             None => {
                 let since = *self.since.get_or_insert(time_s);
-                let part = (time_s - since) / self.held_s;
+                let part = (time_s - since) / self.hold_s;
                 match part >= 1.0 {
-                    true => Held::Taken,
-                    false => Held::Steady { part: part.max(0.0) },
+                    true => HoldStatus::Taken,
+                    false => HoldStatus::Steady { part: part.max(0.0) },
                 }
             }
             Some(held) => {
@@ -150,11 +155,11 @@ impl Holding {
         corners: &Corners,
         last: Option<(f64, Corners)>,
         blur_px: Option<f64>,
-    ) -> Option<Held> {
+    ) -> Option<HoldStatus> {
         let seen = hull(corners.values().copied().collect());
         let overlap = overlap(&seen, &self.hull);
-        if overlap < LEAST_OVERLAP {
-            return Some(Held::Elsewhere { overlap });
+        if overlap < MIN_OVERLAP {
+            return Some(HoldStatus::Elsewhere { overlap });
         }
         let is_known = |s: &Sighting| s.panel.index() < self.panels.len();
         let pose = view.sightings.iter().all(is_known).then_some(());
@@ -169,28 +174,28 @@ impl Holding {
             });
             off.fold(0.0, f64::max)
         });
-        if off_rad > MOST_TURN_RAD {
-            return Some(Held::Turned { off_rad });
+        if off_rad > MAX_ROTATION_RAD {
+            return Some(HoldStatus::Turned { off_rad });
         }
         let before = last.filter(|(before, _)| (0.0..=FORGOTTEN_S).contains(&(time_s - before)));
         let Some((before_s, before)) = before.filter(|(before, _)| *before < time_s) else {
             // A single image does not show motion.
-            return Some(Held::Moving { smear_px: f64::INFINITY });
+            return Some(HoldStatus::Moving { smear_px: f64::INFINITY });
         };
         let moved = corners.iter().filter_map(|(key, at)| Some(at.distance(*before.get(key)?)));
         let speed = median(moved.collect())? / (time_s - before_s);
         let smear_px = speed * self.exposure_s;
-        if smear_px > MOST_SMEAR_PX {
-            return Some(Held::Moving { smear_px });
+        if smear_px > MAX_SMEAR_PX {
+            return Some(HoldStatus::Moving { smear_px });
         }
         let observations = view.sightings.iter().flat_map(|sighting| &sighting.observations);
         let deviations =
             observations.filter_map(|o| o.cov).map(|[xx, _, yy]| (0.5 * (xx + yy)).sqrt());
         let is_blurred = match blur_px {
-            Some(blur) => blur > MOST_BLUR_PX,
-            None => median(deviations.collect()).is_some_and(|sd| sd > MOST_SD_PX),
+            Some(blur) => blur > MAX_BLUR_PX,
+            None => median(deviations.collect()).is_some_and(|sd| sd > MAX_SD_PX),
         };
-        is_blurred.then_some(Held::Blurred)
+        is_blurred.then_some(HoldStatus::Blurred)
     }
 }
 

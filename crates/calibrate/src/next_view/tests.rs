@@ -3,7 +3,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use glam::{DQuat, DVec2, DVec3};
 
 use crate::{
-    Calibration, Guide, Guided, Held, Holding, Model, NextView, Observation, PanelRef,
+    Calibration, Guide, Guided, HoldStatus, HoldTracker, Model, NextView, Observation, PanelRef,
     ProposedCorner, Reference, Sighting, Source, UncertaintyMap, View,
 };
 use deltille_core::camera::{BrownConrady, Camera, Lens, Pose};
@@ -140,7 +140,7 @@ fn proposed_corners_are_found_and_poses_match_their_description() {
                 let place = places.iter().find(|c| (c.row, c.col) == (corner.row, corner.col));
                 next.camera_from_target.apply(place.unwrap().target_mm).length()
             };
-            let away = DVec2::from_angle(next.away_rad);
+            let away = DVec2::from_angle(next.tilt_direction_rad);
             let along = |c: &&ProposedCorner| away.dot(c.pixel);
             let far = next.corners.iter().max_by(|a, b| along(a).total_cmp(&along(b))).unwrap();
             let near = next.corners.iter().min_by(|a, b| along(a).total_cmp(&along(b))).unwrap();
@@ -245,7 +245,7 @@ fn the_sentence_states_position_and_tilt() {
     assert!(said.ends_with("facing the camera"), "{said}");
     next.at = DVec2::new(0.9, 0.1);
     next.tilt_rad = 0.7;
-    next.away_rad = PI;
+    next.tilt_direction_rad = PI;
     next.roll_rad = FRAC_PI_2;
     next.distance_mm = 612.0;
     assert_eq!(
@@ -271,31 +271,42 @@ fn an_image_is_taken_when_the_board_is_in_place_still_and_sharp() {
     let shifted = |mm: f64| Pose { translation: DVec3::new(mm, 0.0, 0.0), ..Pose::IDENTITY };
     let view = |moved: Pose| held(&target, &next, moved, 1);
     let there = view(shifted(0.0));
-    let mut holding = Holding::new(&next, panels());
-    assert_eq!(holding.look(0.0, None, None), Held::Unseen);
-    assert!(matches!(holding.look(0.1, Some(&view(shifted(150.0))), None), Held::Elsewhere { .. }));
+    let mut holding = HoldTracker::new(&next, panels());
+    assert_eq!(holding.observe(0.0, None, None), HoldStatus::Unseen);
+    assert!(matches!(
+        holding.observe(0.1, Some(&view(shifted(150.0))), None),
+        HoldStatus::Elsewhere { .. }
+    ));
     // A motion of 8 mm in a tenth of a second is 2 px of smear at 30 frames per second.
-    assert!(matches!(holding.look(0.2, Some(&view(shifted(8.0))), None), Held::Moving { .. }));
+    assert!(matches!(
+        holding.observe(0.2, Some(&view(shifted(8.0))), None),
+        HoldStatus::Moving { .. }
+    ));
     assert!(
-        matches!(holding.look(0.3, Some(&there), None), Held::Moving { smear_px } if smear_px > 1.0)
+        matches!(holding.observe(0.3, Some(&there), None), HoldStatus::Moving { smear_px } if smear_px > 1.0)
     );
-    assert_eq!(holding.look(0.4, Some(&there), None), Held::Steady { part: 0.0 });
-    assert!(matches!(holding.look(0.6, Some(&there), None), Held::Steady { part } if part > 0.4));
-    assert_eq!(holding.look(0.81, Some(&there), None), Held::Taken);
+    assert_eq!(holding.observe(0.4, Some(&there), None), HoldStatus::Steady { part: 0.0 });
+    assert!(
+        matches!(holding.observe(0.6, Some(&there), None), HoldStatus::Steady { part } if part > 0.4)
+    );
+    assert_eq!(holding.observe(0.81, Some(&there), None), HoldStatus::Taken);
     // A blurred image restarts the holding time.
-    assert_eq!(holding.look(0.9, Some(&there), Some(5.0)), Held::Blurred);
-    assert_eq!(holding.look(1.0, Some(&there), Some(1.0)), Held::Steady { part: 0.0 });
+    assert_eq!(holding.observe(0.9, Some(&there), Some(5.0)), HoldStatus::Blurred);
+    assert_eq!(holding.observe(1.0, Some(&there), Some(1.0)), HoldStatus::Steady { part: 0.0 });
     let mut smeared = there.clone();
     for seen in &mut smeared.sightings[0].observations {
         seen.cov = Some([0.09, 0.0, 0.01]);
     }
-    assert_eq!(holding.look(1.1, Some(&smeared), None), Held::Blurred);
+    assert_eq!(holding.observe(1.1, Some(&smeared), None), HoldStatus::Blurred);
     // A board facing the camera differs from one tilted by 40°.
     let middle = next.camera_from_target.apply(target.panels[0].middle_mm());
-    let back = DQuat::from_axis_angle(DVec3::Y, if next.away_rad.cos() > 0.0 { 0.6 } else { -0.6 });
+    let back = DQuat::from_axis_angle(
+        DVec3::Y,
+        if next.tilt_direction_rad.cos() > 0.0 { 0.6 } else { -0.6 },
+    );
     let facing = Pose { rotation: back, translation: middle - back * middle };
-    let held = holding.look(1.2, Some(&view(facing)), None);
-    assert!(matches!(held, Held::Turned { off_rad } if off_rad > 0.4), "{held:?}");
+    let held = holding.observe(1.2, Some(&view(facing)), None);
+    assert!(matches!(held, HoldStatus::Turned { off_rad } if off_rad > 0.4), "{held:?}");
     // After a pause the motion is not known.
-    assert!(matches!(holding.look(9.0, Some(&there), None), Held::Moving { .. }));
+    assert!(matches!(holding.observe(9.0, Some(&there), None), HoldStatus::Moving { .. }));
 }

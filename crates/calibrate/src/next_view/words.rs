@@ -58,7 +58,7 @@ impl fmt::Display for NextView {
             false => write!(
                 f,
                 "with its {} tilted away by {:.0}°",
-                SIDES[direction(self.away_rad)],
+                SIDES[direction(self.tilt_direction_rad)],
                 round_to_5(self.tilt_rad.to_degrees())
             )?,
         }

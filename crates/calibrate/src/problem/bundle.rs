@@ -6,7 +6,7 @@ use super::corner_map::CornerMap;
 use super::shape::Shape;
 use super::unknowns::{Block, CameraUnknowns, PanelUnknowns, TargetUnknowns};
 use crate::cancel::Stop;
-use crate::input::observation::{LEAST_CORNERS, Observation};
+use crate::input::observation::{MIN_CORNERS, Observation};
 use crate::input::panel::PanelRef;
 use deltille_core::camera::Pose;
 
@@ -133,7 +133,7 @@ impl Problem {
         let all = |block: &Block, kept: bool| vec![kept; block.observations.len()];
         let kept: Vec<Vec<bool>> =
             self.blocks.iter().zip(kept).map(|(block, kept)| all(block, kept)).collect();
-        let has_enough = |frame: usize| corners[frame] >= LEAST_CORNERS;
+        let has_enough = |frame: usize| corners[frame] >= MIN_CORNERS;
         let mut problem = self.with_corners(&kept).with_frames(has_enough);
         problem.blocks.retain(|block| !block.observations.is_empty());
         Part { problem, frames: (0..self.frames.len()).filter(|&f| has_enough(f)).collect() }

@@ -19,7 +19,7 @@ use deltille_core::statistics::median;
 const FIRST_PRIOR: f64 = 0.01;
 
 /// Least prior standard deviation, mm: a hundredth of the resolution of the best print.
-const LEAST_PRIOR_MM: f64 = 1e-4;
+const MIN_PRIOR_MM: f64 = 1e-4;
 
 /// A corner of a panel: index of the panel, row, column.
 type Label = (usize, i32, i32);
@@ -117,7 +117,7 @@ impl CornerMap {
                     determined += 1.0 - covariance[(k, k)] * (sigma / self.prior_mm[k]).powi(2);
                 }
             }
-            ((squares / determined.max(1.0)).sqrt().max(LEAST_PRIOR_MM), determined)
+            ((squares / determined.max(1.0)).sqrt().max(MIN_PRIOR_MM), determined)
         };
         let [(plane, in_plane), (out, out_of_plane)] = [of_axes(&[0, 1]), of_axes(&[2])];
         (DVec3::new(plane, plane, out), in_plane + out_of_plane)

@@ -29,7 +29,7 @@ const FIRST_PART: f64 = 0.1;
 
 /// Least standard deviation of a second difference, in knot distances: a ten-thousandth of a pixel for knots a hundred
 /// pixels apart.
-const LEAST_PART: f64 = 1e-6;
+const MIN_PART: f64 = 1e-6;
 
 /// Exponent of the over-relaxation of the update of s: plain fixed-point steps are small, and all in one direction.
 const FARTHER: f64 = 1.5;
@@ -182,7 +182,7 @@ impl Roughness {
         let determined = self.rank() as f64 - open * (sigma / self.size).powi(2);
         let size = (squares.max(0.0) / determined.max(1.0)).sqrt();
         let size = self.size * (size / self.size).powf(FARTHER);
-        Self { size: size.max(LEAST_PART * self.grid.distance()), ..self.clone() }
+        Self { size: size.max(MIN_PART * self.grid.distance()), ..self.clone() }
     }
 
     /// Relative change of s from this prior to another.

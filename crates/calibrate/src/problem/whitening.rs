@@ -14,7 +14,7 @@ pub(crate) const MEDIAN_OF_CHI_SQUARED_2: f64 = 1.386_294_361_119_890_6;
 const HALVINGS: usize = 30;
 
 /// Least standard deviation of residuals: far below that of any corner, so that exact data do not divide by zero.
-const LEAST_SIGMA: f64 = 1e-6;
+const MIN_SIGMA: f64 = 1e-6;
 
 /// Limit of an outlier in standard deviations: four in a million corners with normal errors exceed it.
 pub(crate) const OUTLIER_SIGMA: f64 = 5.0;
@@ -93,7 +93,7 @@ impl Whitening {
         let whitened = self.blocks.iter().flatten().zip(residuals.iter().flatten());
         let squares = whitened.map(|(&w, &r)| Self::apply(w, r).length_squared());
         let square = median(squares.collect()).unwrap_or(0.0) / MEDIAN_OF_CHI_SQUARED_2;
-        (square / left_free(problem)).sqrt().max(LEAST_SIGMA)
+        (square / left_free(problem)).sqrt().max(MIN_SIGMA)
     }
 }
 
@@ -101,11 +101,11 @@ impl Whitening {
 fn left_free(problem: &Problem) -> f64 {
     let Some(map) = &problem.map else { return 1.0 };
     let unknowns = map.determined + 6.0 * problem.frames.len() as f64;
-    (1.0 - unknowns / (2.0 * problem.count().max(1) as f64)).max(LEAST_FREE)
+    (1.0 - unknowns / (2.0 * problem.count().max(1) as f64)).max(MIN_FREE)
 }
 
 /// Least value of that fraction: two views of a corner leave a quarter.
-const LEAST_FREE: f64 = 0.25;
+const MIN_FREE: f64 = 0.25;
 
 /// The covariances of all corners; `None` if no corner has one. A corner without one among
 /// others that have one was the hardest to refine: it gets the largest variance of all.

@@ -23,7 +23,7 @@ use deltille_core::statistics::median;
 
 /// Least number of views: two views of a plane determine focal length and principal point if there are no errors; a
 /// third reveals errors.
-const LEAST_VIEWS: usize = 3;
+const MIN_VIEWS: usize = 3;
 
 /// Parametric lenses from which a spline may start: a fisheye and a perspective lens.
 const FORERUNNERS: [Model; 2] = [Model::KannalaBrandt(4), Model::Radtan5];
@@ -54,8 +54,8 @@ pub(crate) fn start(calibration: &Calibration) -> Result<Start, CalibrationError
 
 /// Rejects too few views for a calibration.
 pub(crate) fn enough(found: usize, all: usize) -> Result<(), CalibrationError> {
-    match found < LEAST_VIEWS {
-        true => Err(CalibrationError::TooFewViews { found, all, needed: LEAST_VIEWS }),
+    match found < MIN_VIEWS {
+        true => Err(CalibrationError::TooFewViews { found, all, needed: MIN_VIEWS }),
         false => Ok(()),
     }
 }

@@ -14,7 +14,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::input::observation::{LEAST_CORNERS, Observation, Sighting, View};
+use crate::input::observation::{MIN_CORNERS, Observation, Sighting, View};
 use deltille_core::statistics::median;
 
 /// Greatest deviation of the middle corner from the mean of its neighbours, as a fraction of their
@@ -72,7 +72,7 @@ fn largest_agreement(corners: &[Observation]) -> Option<Vec<usize>> {
         members.entry(find(&sets, corner)).or_default().push(corner);
     }
     let largest = members.into_values().max_by_key(Vec::len);
-    largest.filter(|largest| largest.len() >= LEAST_CORNERS)
+    largest.filter(|largest| largest.len() >= MIN_CORNERS)
 }
 
 fn agreeing_triples(corners: &[Observation]) -> Vec<[usize; 3]> {

@@ -13,11 +13,11 @@ use crate::input::sample::evenly;
 use deltille_core::statistics::median;
 
 /// Largest lag that is detected, frames.
-const MOST_DELAY: i32 = 10;
+const MAX_DELAY: i32 = 10;
 
 /// Least and greatest number of frames used for comparing lags: more do not help.
-const LEAST_MOMENTS: usize = 8;
-const MOST_MOMENTS: usize = 60;
+const MIN_MOMENTS: usize = 8;
+const MAX_MOMENTS: usize = 60;
 
 /// Factor by which the scatter at the lag must be smaller than without. A target that hardly moved, or moved uniformly
 /// from frame to frame, does not reveal a lag, and does not need it corrected.
@@ -73,7 +73,7 @@ fn usual(delays: &[i32]) -> i32 {
 /// The lag of a camera relative to another, and the number of informative frames; `None` if these are too few.
 fn delay_between(from: &Track, to: &Track, symmetries: &Symmetries) -> Option<(i32, usize)> {
     let scatters = |how: &dyn Fn(i32) -> Option<(f64, usize)>| {
-        let all = (-MOST_DELAY..=MOST_DELAY).filter_map(|delay| Some((delay, how(delay)?)));
+        let all = (-MAX_DELAY..=MAX_DELAY).filter_map(|delay| Some((delay, how(delay)?)));
         all.collect::<Vec<(i32, (f64, usize))>>()
     };
     let mut all = scatters(&|delay| scatter_of_poses(from, to, delay, symmetries));
@@ -121,8 +121,8 @@ fn scatter_of_poses(
     });
     let relative: Vec<_> = relative.collect();
     let count = relative.len();
-    let moments: Vec<_> = evenly(&relative, MOST_MOMENTS).cloned().collect();
-    (count >= LEAST_MOMENTS).then(|| Some((agreed(&moments)?.spread_mm, count))).flatten()
+    let moments: Vec<_> = evenly(&relative, MAX_MOMENTS).cloned().collect();
+    (count >= MIN_MOMENTS).then(|| Some((agreed(&moments)?.spread_mm, count))).flatten()
 }
 
 /// Difference of the rotations between frames as seen by the two cameras, rad.
@@ -138,7 +138,7 @@ fn scatter_of_rotations(from: &Track, to: &Track, delay: i32) -> Option<(f64, us
         }
     }
     let count = off.len();
-    (count >= LEAST_MOMENTS).then(|| median(off)).flatten().map(|scatter| (scatter, count))
+    (count >= MIN_MOMENTS).then(|| median(off)).flatten().map(|scatter| (scatter, count))
 }
 
 /// Rotation of a target between two frames; `None` if no target is seen in both.

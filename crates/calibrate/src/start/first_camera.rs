@@ -18,14 +18,14 @@ const LONGEST: f64 = 60.0;
 const RATIO: f64 = 1.1;
 
 /// Number of views used, evenly over the sequence, and number of corners in each.
-const MOST_VIEWS: usize = 15;
-const MOST_CORNERS: usize = 40;
+const MAX_VIEWS: usize = 15;
+const MAX_CORNERS: usize = 40;
 
 /// Finds the ideal camera that explains the views best.
 pub(super) fn first_camera(views: &[View], model: Model) -> Option<Camera> {
     let [width, height] = views.first()?.size_px;
     let samples: Vec<Vec<Observation>> =
-        evenly(views, MOST_VIEWS).filter_map(largest_panel).collect();
+        evenly(views, MAX_VIEWS).filter_map(largest_panel).collect();
     let perspective = Lens::BrownConrady(BrownConrady::default());
     let equidistant = Lens::KannalaBrandt(KannalaBrandt::default());
     // A strongly distorted perspective lens is closer to an equidistant one.
@@ -61,5 +61,5 @@ fn squared_px(camera: &Camera, pose: &Pose, seen: &Observation) -> f64 {
 
 fn largest_panel(view: &View) -> Option<Vec<Observation>> {
     let largest = view.sightings.iter().max_by_key(|sighting| sighting.observations.len())?;
-    Some(evenly(&largest.observations, MOST_CORNERS).copied().collect())
+    Some(evenly(&largest.observations, MAX_CORNERS).copied().collect())
 }

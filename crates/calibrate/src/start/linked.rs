@@ -10,12 +10,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::motion::{Moment, placed_by_motion};
 use super::pose::middle;
-use crate::error::{CalibrationError, TooPlain};
+use crate::error::{CalibrationError, DegenerateMotion};
 use crate::input::calibration::Calibration;
 use deltille_core::camera::Pose;
 
 /// Least number of frames that two cameras must share: one may be wrong, but the median of three is right.
-pub(super) const LEAST_SHARED: usize = 3;
+pub(super) const MIN_SHARED: usize = 3;
 
 /// The view of a target by a camera on its own.
 #[derive(Clone, Copy)]
@@ -81,7 +81,7 @@ struct Linking<'a> {
     cameras: Vec<Option<Pose>>,
     targets: Vec<Option<Pose>>,
     /// A camera and a target whose poses the motion does not determine, and the reason.
-    plain: Option<(usize, usize, TooPlain)>,
+    plain: Option<(usize, usize, DegenerateMotion)>,
 }
 
 impl Linking<'_> {
@@ -123,7 +123,7 @@ impl Linking<'_> {
             (*frames, std::cmp::Reverse(*from), std::cmp::Reverse(*to))
         });
         let Some(((frames, relative), from, to)) = most else { return false };
-        if frames < LEAST_SHARED {
+        if frames < MIN_SHARED {
             return false;
         }
         self.cameras[to] = self.cameras[from].map(|from_rig| middle(&relative).after(&from_rig));
@@ -175,7 +175,7 @@ impl Linking<'_> {
         let Some((target, places)) = open.max_by_key(|(_, places)| places.len()) else {
             return false;
         };
-        if places.len() < LEAST_SHARED {
+        if places.len() < MIN_SHARED {
             return false;
         }
         self.targets[target] = Some(middle(&places));
@@ -199,7 +199,7 @@ impl Linking<'_> {
         let Some((camera, places)) = open.max_by_key(|(_, places)| places.len()) else {
             return false;
         };
-        if places.len() < LEAST_SHARED {
+        if places.len() < MIN_SHARED {
             return false;
         }
         self.cameras[camera] = Some(middle(&places));
@@ -220,7 +220,7 @@ impl Linking<'_> {
             |camera: usize| Self::indices(&self.targets, false).map(move |target| (camera, target));
         let open = Self::indices(&self.cameras, false).flat_map(of_camera);
         let mut pairs: Vec<_> = open.map(|(camera, target)| of_pair(camera, target)).collect();
-        pairs.retain(|(_, _, moments)| moments.len() >= LEAST_SHARED);
+        pairs.retain(|(_, _, moments)| moments.len() >= MIN_SHARED);
         pairs.sort_by_key(|(_, _, moments)| std::cmp::Reverse(moments.len()));
         for (camera, target, moments) in pairs {
             match placed_by_motion(&moments) {
@@ -255,13 +255,13 @@ impl Linking<'_> {
             return Err(CalibrationError::Apart {
                 cameras: names.collect::<Vec<_>>().join(", "),
                 shared,
-                needed: LEAST_SHARED,
+                needed: MIN_SHARED,
             });
         }
         if let Some(target) = Self::indices(&self.targets, false).next() {
             return Err(CalibrationError::TargetApart {
                 target: calibration.targets[target].name.clone(),
-                needed: LEAST_SHARED,
+                needed: MIN_SHARED,
             });
         }
         let is_given = calibration.targets.iter().any(|target| target.scene_from_target.is_some());

@@ -12,12 +12,12 @@
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector6};
 
-use crate::error::TooPlain;
+use crate::error::DegenerateMotion;
 use deltille_core::camera::Pose;
 use deltille_core::statistics::median;
 
 /// Least rotation about a second axis, rad (1°): more than the noise of poses.
-const LEAST_ROTATION_RAD: f64 = 0.017;
+const MIN_ROTATION_RAD: f64 = 0.017;
 
 /// Number of reweighting rounds, in which frames that do not fit lose their weight.
 const ROUNDS: usize = 10;
@@ -30,7 +30,7 @@ pub(super) struct Moment {
 }
 
 /// Computes `camera_from_rig` and `scene_from_target`.
-pub(super) fn placed_by_motion(moments: &[Moment]) -> Result<[Pose; 2], TooPlain> {
+pub(super) fn placed_by_motion(moments: &[Moment]) -> Result<[Pose; 2], DegenerateMotion> {
     check_rotations(moments)?;
     let mut weights = vec![1.0; moments.len()];
     let mut rotations = [DQuat::IDENTITY; 2];
@@ -61,8 +61,8 @@ fn posed(rotations: [DQuat; 2], places: [DVec3; 2]) -> [Pose; 2] {
 }
 
 /// Rejects a rig that did not rotate about two axes.
-fn check_rotations(moments: &[Moment]) -> Result<(), TooPlain> {
-    let Some(first) = moments.first() else { return Err(TooPlain::NoTurn) };
+fn check_rotations(moments: &[Moment]) -> Result<(), DegenerateMotion> {
+    let Some(first) = moments.first() else { return Err(DegenerateMotion::NoRotation) };
     let back = first.rig_from_scene.rotation.conjugate();
     let turns = moments.iter().map(|moment| {
         let turn = back * moment.rig_from_scene.rotation;
@@ -76,8 +76,8 @@ fn check_rotations(moments: &[Moment]) -> Result<(), TooPlain> {
         scatter.symmetric_eigenvalues().iter().map(|v| v.max(0.0).sqrt()).collect();
     rms.sort_by(f64::total_cmp);
     match rms[..] {
-        [_, _, most] if most < LEAST_ROTATION_RAD => Err(TooPlain::NoTurn),
-        [_, second, _] if second < LEAST_ROTATION_RAD => Err(TooPlain::OneAxis),
+        [_, _, most] if most < MIN_ROTATION_RAD => Err(DegenerateMotion::NoRotation),
+        [_, second, _] if second < MIN_ROTATION_RAD => Err(DegenerateMotion::OneAxis),
         _ => Ok(()),
     }
 }
@@ -184,9 +184,9 @@ mod tests {
                 assert!(turn.length() < 1e-3 && step.length() < 1.0, "{seed}: {turn} {step}");
             }
             let one = moments(&mut random, truth, DVec3::new(0.0, 0.6, 0.0));
-            assert_eq!(placed_by_motion(&one).unwrap_err(), TooPlain::OneAxis);
+            assert_eq!(placed_by_motion(&one).unwrap_err(), DegenerateMotion::OneAxis);
             let none = moments(&mut random, truth, DVec3::ZERO);
-            assert_eq!(placed_by_motion(&none).unwrap_err(), TooPlain::NoTurn);
+            assert_eq!(placed_by_motion(&none).unwrap_err(), DegenerateMotion::NoRotation);
         }
     }
 }

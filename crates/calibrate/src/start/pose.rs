@@ -14,7 +14,7 @@ use deltille_core::camera::{Camera, Pose};
 use deltille_core::statistics::median;
 
 /// Number of corners that determine a homography.
-const LEAST_RAYS: usize = 4;
+const MIN_RAYS: usize = 4;
 
 /// Number of panels, the largest first, that give initial poses: two of them may be wrong.
 const STARTS: usize = 3;
@@ -121,7 +121,7 @@ pub(crate) fn planar_pose(camera: &Camera, observations: &[Observation]) -> Opti
         }
         rays.push((b, at));
     }
-    if rays.len() < LEAST_RAYS {
+    if rays.len() < MIN_RAYS {
         return None;
     }
     let eigen = normal.symmetric_eigen();

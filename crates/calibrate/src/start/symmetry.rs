@@ -20,7 +20,7 @@ use std::f64::consts::FRAC_PI_4;
 
 use glam::{DQuat, DVec3};
 
-use super::linked::{ByFrame, LEAST_SHARED, Seen};
+use super::linked::{ByFrame, MIN_SHARED, Seen};
 use crate::input::calibration::Calibration;
 use crate::input::observation::Observation;
 use crate::input::sample::evenly;
@@ -29,7 +29,7 @@ use deltille_core::lattice::{LatticeMap, Vertex};
 use deltille_core::statistics::median;
 
 /// Greatest number of frames whose poses are compared: more do not improve the decision.
-const MOST_FRAMES: usize = 60;
+const MAX_FRAMES: usize = 60;
 
 /// Factor by which poses must scatter more with the detected labels before these are changed. The pose from a single
 /// frame may scatter two to three times as much as that from other frames, and poses with wrong labels scatter as far
@@ -50,7 +50,7 @@ pub struct LabelRotation {
     /// Number of frames in which the camera saw the board together with another camera.
     pub of: usize,
     /// Whether no other rotation of the labels fits.
-    pub is_sure: bool,
+    pub is_confirmed: bool,
 }
 
 /// The rotations after which each target looks the same.
@@ -148,20 +148,20 @@ impl Symmetries {
             let Some((frames, from, from_rig, to)) = most else { break };
             let known = given(from).zip(given(to)).map(|(from, to)| to.after(&from.inverse()));
             let found = match known {
-                Some(pose) => Some(Agreed { pose, spread_mm: 0.0, is_sure: true }),
-                None if frames.len() < LEAST_SHARED => break,
+                Some(pose) => Some(Agreed { pose, spread_mm: 0.0, is_confirmed: true }),
+                None if frames.len() < MIN_SHARED => break,
                 None => agreed(&frames),
             };
             let Some(found) = found else { break };
             let to_rig = found.pose.after(&from_rig);
             let (frames, of) = self.rotate(seen, &placed, to, to_rig);
             let degrees = self.least_degrees(&seen[to]);
-            let is_of_note = degrees.is_some() && (frames > 0 || !found.is_sure);
+            let is_of_note = degrees.is_some() && (frames > 0 || !found.is_confirmed);
             said[to] = degrees.filter(|_| is_of_note).map(|degrees| LabelRotation {
                 degrees,
                 frames,
                 of,
-                is_sure: found.is_sure,
+                is_confirmed: found.is_confirmed,
             });
             placed.push((to, to_rig));
             open.retain(|&camera| camera != to);
@@ -261,7 +261,7 @@ pub(super) struct Agreed {
     /// The median distance of the frames from it, mm.
     pub spread_mm: f64,
     /// Whether no pose from other labels fits.
-    pub is_sure: bool,
+    pub is_confirmed: bool,
 }
 
 /// Distance of two poses; a rotation counts by the displacement of a point at the end of an arm.
@@ -272,7 +272,7 @@ fn apart_mm(a: &Pose, b: &Pose, arm_mm: f64) -> f64 {
 /// Finds the pose on which most frames agree. Each frame has the pose with the detected labels and those with rotated
 /// labels; the detected labels win unless others agree decisively better. `None` without frames.
 pub(super) fn agreed(frames: &[Vec<Pose>]) -> Option<Agreed> {
-    let frames: Vec<&Vec<Pose>> = evenly(frames, MOST_FRAMES).collect();
+    let frames: Vec<&Vec<Pose>> = evenly(frames, MAX_FRAMES).collect();
     let labelled = || frames.iter().filter_map(|poses| poses.first());
     let arm_mm = median(labelled().map(|pose| pose.translation.length()).collect())?.max(1.0);
     let spread_mm = |pose: &Pose, most: usize| {
@@ -292,5 +292,5 @@ pub(super) fn agreed(frames: &[Vec<Pose>]) -> Option<Agreed> {
     let fits_too = |&(other, spread): &(Pose, f64)| {
         spread < DECISIVE * spread_mm && other.rotation.angle_between(pose.rotation) > OTHER_RAD
     };
-    Some(Agreed { pose, spread_mm, is_sure: !all.iter().any(fits_too) })
+    Some(Agreed { pose, spread_mm, is_confirmed: !all.iter().any(fits_too) })
 }

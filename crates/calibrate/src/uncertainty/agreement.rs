@@ -31,10 +31,10 @@ use crate::problem::corner_map::CornerMap;
 use crate::problem::whitening::Whitening;
 
 /// Least number of frames for an empirical covariance: a calibration remains without one of them.
-const LEAST_FRAMES: usize = 4;
+const MIN_FRAMES: usize = 4;
 
 /// Greatest leverage of one frame on a direction that is corrected for: beyond it no other frame tests the direction.
-const MOST_OF_ONE: f64 = 0.9;
+const MAX_OF_ONE: f64 = 0.9;
 
 /// An empirical covariance.
 pub(crate) struct Observed {
@@ -67,7 +67,7 @@ pub(crate) fn observed(
     found: &Covariances,
 ) -> Option<Observed> {
     let frames = minimum.problem.frames.len();
-    if frames < LEAST_FRAMES || minimum.layout.shared == 0 {
+    if frames < MIN_FRAMES || minimum.layout.shared == 0 {
         return None;
     }
     let all: Vec<usize> = (0..frames).collect();
@@ -185,7 +185,7 @@ fn pull_of(
         return by_some(&own, &pull, found);
     }
     let share = (root.half.tr_mul(&own) * &root.half).symmetric_eigen();
-    let grown = share.eigenvalues.map(|part| (1.0 - part.clamp(0.0, MOST_OF_ONE)).sqrt().recip());
+    let grown = share.eigenvalues.map(|part| (1.0 - part.clamp(0.0, MAX_OF_ONE)).sqrt().recip());
     let turned = share.eigenvectors.tr_mul(&root.half.tr_mul(&pull)).component_mul(&grown);
     let pull = &share.eigenvectors * turned;
     pull.iter().all(|v| v.is_finite()).then_some(pull)
@@ -268,7 +268,7 @@ impl Lanczos {
     /// Whether the next right side is significant.
     fn goes_on(&self) -> bool {
         let left: f64 = self.sizes.iter().skip(1).product();
-        self.sizes.len() <= MOST_DIRECTIONS && left > LEFT && self.sizes.last() != Some(&0.0)
+        self.sizes.len() <= MAX_DIRECTIONS && left > LEFT && self.sizes.last() != Some(&0.0)
     }
 
     /// Accepts the solution for the next right side, and forms the one after it.
@@ -298,7 +298,7 @@ impl Lanczos {
             _ => 0.0,
         });
         let eigen = tridiagonal.symmetric_eigen();
-        let grown = eigen.eigenvalues.map(|part| (1.0 - part.clamp(0.0, MOST_OF_ONE)).recip());
+        let grown = eigen.eigenvalues.map(|part| (1.0 - part.clamp(0.0, MAX_OF_ONE)).recip());
         let first = eigen.eigenvectors.row(0).transpose();
         let whole = self.sizes.first().copied().unwrap_or_default();
         let parts = &eigen.eigenvectors * grown.component_mul(&first) * whole;
@@ -314,12 +314,12 @@ impl Lanczos {
 const LEFT: f64 = 1e-4;
 
 /// Most directions in which the leverage of a frame is resolved: those of large leverage come first.
-const MOST_DIRECTIONS: usize = 40;
+const MAX_DIRECTIONS: usize = 40;
 
 /// The same for a frame that touches only some of the unknowns.
 fn by_some(own: &DMatrix<f64>, pull: &DVector<f64>, found: &Covariances) -> Option<DVector<f64>> {
     let share = LocalShare::of(own, &found.shared)?;
-    let more = |part: f64| (1.0 - part.clamp(0.0, MOST_OF_ONE)).sqrt().recip() - 1.0;
+    let more = |part: f64| (1.0 - part.clamp(0.0, MAX_OF_ONE)).sqrt().recip() - 1.0;
     let more = share.along(pull).component_mul(&share.parts.map(more));
     let pull = found.root.half.tr_mul(pull) + share.spread(&more, &found.root.half);
     pull.iter().all(|v| v.is_finite()).then_some(pull)

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::state_equations::{Candidate, StateEquations, significance};
 use deltille_core::camera::Camera;
-use deltille_core::statistics::f_chance;
+use deltille_core::statistics::f_p_value;
 
 /// Probability that a correct covariance is raised, for all parameters and both splits together.
 const SIGNIFICANT: f64 = 0.01;
@@ -18,7 +18,7 @@ const SIGNIFICANT: f64 = 0.01;
 const WAYS: usize = 2;
 
 /// Least number of views in a half.
-const LEAST_VIEWS: usize = 5;
+const MIN_VIEWS: usize = 5;
 
 /// The covariance of a camera's parameters, raised if the halves call for it. `noise` is the covariance from noise.
 pub(crate) fn raised(
@@ -29,7 +29,7 @@ pub(crate) fn raised(
 ) -> DMatrix<f64> {
     let count = equations.count();
     let n = observed.nrows();
-    if count < 2 * LEAST_VIEWS || equations.parameter_count() != n {
+    if count < 2 * MIN_VIEWS || equations.parameter_count() != n {
         return observed;
     }
     let limit = SIGNIFICANT / (WAYS * (n + 1)) as f64;
@@ -45,8 +45,9 @@ pub(crate) fn raised(
             let half = first.noise_variance(i) + second.noise_variance(i);
             (observed[(i, i)] * half / noise[(i, i)]).sqrt()
         };
-        let chance = |i: usize| f_chance((off[i] / of_halves(i)).powi(2), 1.0, (count - 2) as f64);
-        ((0..n).map(chance).fold(1.0, f64::min) < limit).then_some(off)
+        let p_value =
+            |i: usize| f_p_value((off[i] / of_halves(i)).powi(2), 1.0, (count - 2) as f64);
+        ((0..n).map(p_value).fold(1.0, f64::min) < limit).then_some(off)
     });
     // The focal lengths alone: with one common lens, halves that show the board differently determine them better.
     let focal = ways.iter().filter(|_| equations.is_focal_free()).filter_map(|is_first| {

@@ -122,8 +122,8 @@ pub(crate) fn solved(a: &Matrix6<f64>, b: &DMatrix<f64>) -> Option<DMatrix<f64>>
 /// Derivatives of a pixel with respect to a rotation and a translation of the point.
 pub(crate) fn by_motion(at: &Projection, point: DVec3) -> SMatrix<f64, 2, 6> {
     let rows = at.by_point.map(DVec3::from);
-    let turns = rows.map(|row| point.cross(row));
-    SMatrix::from_fn(|i, j| if j < 3 { turns[i][j] } else { rows[i][j - 3] })
+    let rotations = rows.map(|row| point.cross(row));
+    SMatrix::from_fn(|i, j| if j < 3 { rotations[i][j] } else { rows[i][j - 3] })
 }
 
 /// Derivatives of a pixel with respect to some parameters.

@@ -16,11 +16,11 @@ use nalgebra::{DMatrix, DVector};
 
 use super::projection::by_motion;
 use crate::input::loss::Loss;
-use crate::input::observation::LEAST_CORNERS;
+use crate::input::observation::MIN_CORNERS;
 use crate::problem::bundle::Problem;
 use crate::problem::whitening::Whitening;
 use deltille_core::camera::Lens;
-use deltille_core::statistics::f_chance;
+use deltille_core::statistics::f_p_value;
 
 /// The columns besides those of the camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -122,7 +122,7 @@ pub(crate) struct Effect {
 /// The p-value of an effect: the probability that noise causes it.
 pub(crate) fn significance(effect: Effect) -> f64 {
     match effect.freedom >= 1.0 {
-        true => f_chance((effect.value / effect.sd).powi(2), 1.0, effect.freedom),
+        true => f_p_value((effect.value / effect.sd).powi(2), 1.0, effect.freedom),
         false => 1.0,
     }
 }
@@ -418,7 +418,7 @@ impl Equations<'_> {
                 white += whitened.length_squared();
             }
         }
-        if count < LEAST_CORNERS {
+        if count < MIN_CORNERS {
             return None;
         }
         let gram = eliminated(gram, 6)?;

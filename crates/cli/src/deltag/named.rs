@@ -17,7 +17,7 @@ pub fn deltags(family: Family) -> anyhow::Result<Family> {
              `deltille checkerboard --tags {name}`"
         );
     }
-    if family.is_of_places() {
+    if family.is_position_family() {
         let name = family.name();
         bail!(
             "{name} contains position codes, which work only on whole boards: use `deltille board --dense`"

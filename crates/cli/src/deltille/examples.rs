@@ -83,7 +83,7 @@ pub const COMPARE: &str = "Examples:
 
 pub const POSE: &str = "Examples:
   deltille pose photos --target desk/desk.json --camera camera.yaml
-  deltille pose photo.png --target desk/desk.json --camera camera.yaml --every-picture";
+  deltille pose photo.png --target desk/desk.json --camera camera.yaml --all-images";
 
 pub const UNDISTORT: &str = "Examples:
   deltille undistort photos --camera camera.yaml -o straight";

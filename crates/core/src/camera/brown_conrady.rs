@@ -210,7 +210,7 @@ impl LensLaw for BrownConrady {
     /// ```
     ///
     /// of r. It must stay between 0, where the image folds, and [`STEEPEST`].
-    fn steady_radius(&self) -> Option<f64> {
+    fn monotonic_radius(&self) -> Option<f64> {
         let with_one = |[a, b, c]: [f64; 3]| [1.0, a, b, c];
         let (above, below) = (with_one(self.radial), with_one(self.denominator));
         let both = product(&above, &below);

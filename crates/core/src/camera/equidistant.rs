@@ -49,7 +49,7 @@ pub(super) fn angle(k: &[f64], wanted: f64) -> Option<f64> {
 }
 
 /// Returns r at the smallest θ up to π where the polynomial stops increasing.
-pub(super) fn steady_radius(k: &[f64]) -> Option<f64> {
+pub(super) fn monotonic_radius(k: &[f64]) -> Option<f64> {
     // ∂r/∂θ as a polynomial in θ².
     let mut slope = vec![1.0];
     slope.extend(k.iter().enumerate().map(|(i, k)| (2 * i + 3) as f64 * k));

@@ -37,7 +37,7 @@ use crate::identity::TargetIdentity;
 use crate::quantity;
 use crate::reading::in_words;
 
-use super::kannala_brandt::LEAST_TERMS;
+use super::kannala_brandt::MIN_TERMS;
 use super::{Camera, Lens, LensKind, MAX_LENS_PARAMETERS, SplineGrid};
 
 /// Maximum size of a camera file in bytes. Most have less than a hundredth of it. YAML parsers take time with the
@@ -187,7 +187,7 @@ impl CameraFile {
         let spline = spline.map(SplineGrid::checked).transpose();
         let spline = spline.map_err(|problem| key("spline", problem.to_string()))?;
         let lens = model
-            .lens(distortion.len().clamp(LEAST_TERMS, MAX_LENS_PARAMETERS), spline)
+            .lens(distortion.len().clamp(MIN_TERMS, MAX_LENS_PARAMETERS), spline)
             .ok_or_else(|| {
                 key("spline", "only the model `spline` has this key, and it requires it".to_owned())
             })?;

@@ -4,7 +4,7 @@ use super::equidistant::{self, Angle};
 use super::law::{Imaged, LensLaw, Ray};
 
 /// Minimum number of terms of the polynomial; a file may have fewer.
-pub(super) const LEAST_TERMS: usize = 4;
+pub(super) const MIN_TERMS: usize = 4;
 
 /// Equidistant fisheye polynomial (Kannala and Brandt 2006), with four terms as in OpenCV's fisheye module, or more:
 ///
@@ -34,7 +34,7 @@ impl LensLaw for KannalaBrandt {
     }
 
     fn least_coefficients(&self) -> Option<usize> {
-        Some(LEAST_TERMS)
+        Some(MIN_TERMS)
     }
 
     fn image(&self, point: DVec3, by_parameters: &mut [[f64; 2]]) -> Option<Imaged> {
@@ -63,7 +63,7 @@ impl LensLaw for KannalaBrandt {
         Ray::central((sin * at / r).extend(cos))
     }
 
-    fn steady_radius(&self) -> Option<f64> {
-        equidistant::steady_radius(&self.k)
+    fn monotonic_radius(&self) -> Option<f64> {
+        equidistant::monotonic_radius(&self.k)
     }
 }

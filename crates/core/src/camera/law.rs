@@ -66,7 +66,7 @@ pub(super) trait LensLaw {
 
     /// Returns the radius on the normalised plane up to which it increases steadily with the angle, without fold or
     /// pole; `None` if it does so over the whole field of view.
-    fn steady_radius(&self) -> Option<f64> {
+    fn monotonic_radius(&self) -> Option<f64> {
         None
     }
 }

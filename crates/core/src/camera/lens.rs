@@ -149,8 +149,8 @@ impl Lens {
 
     /// Returns the radius on the normalised plane up to which it increases steadily with the angle, without fold or
     /// pole; `None` if it does so over the whole field of view.
-    pub fn steady_radius(&self) -> Option<f64> {
-        self.law().steady_radius()
+    pub fn monotonic_radius(&self) -> Option<f64> {
+        self.law().monotonic_radius()
     }
 
     /// Returns whether the lens is perspective, so that it covers the whole image.

@@ -43,7 +43,7 @@ pub use pupil::Pupil;
 pub use rectification::{Rectification, RectificationError};
 pub use spline::{Knots, Spline, SplineGrid, SplineGridError};
 #[doc(hidden)]
-pub use spline::{MOST_TOUCHED, direction as stereographic_direction};
+pub use spline::{MAX_TOUCHED, direction as stereographic_direction};
 pub use undistortion::{Field, PixelMap, Undistortion, UndistortionError};
 
 /// The parameters that every camera has, in front of those of its lens.

@@ -147,7 +147,7 @@ impl LensLaw for Pupil {
         Some(Ray { origin: DVec3::Z * self.shift(theta).0, direction })
     }
 
-    fn steady_radius(&self) -> Option<f64> {
-        equidistant::steady_radius(&self.k)
+    fn monotonic_radius(&self) -> Option<f64> {
+        equidistant::monotonic_radius(&self.k)
     }
 }

@@ -18,10 +18,10 @@ impl Camera {
     /// // r (1 − r²/3) folds back at r = 1, where its value is 2/3.
     /// let lens = BrownConrady { radial: [-1.0 / 3.0, 0.0, 0.0], ..BrownConrady::default() };
     /// let camera = Camera::centred(1600, 1200, 900.0, Lens::BrownConrady(lens));
-    /// assert!((camera.steady_px().unwrap() - 600.0).abs() < 1e-6);
+    /// assert!((camera.monotonic_px().unwrap() - 600.0).abs() < 1e-6);
     /// ```
-    pub fn steady_px(&self) -> Option<f64> {
-        self.lens.steady_radius().map(|radius| radius * self.focal_px.min_element())
+    pub fn monotonic_px(&self) -> Option<f64> {
+        self.lens.monotonic_radius().map(|radius| radius * self.focal_px.min_element())
     }
 
     /// Returns the distance of a pixel position from the principal point, px.
@@ -95,7 +95,7 @@ mod tests {
     use crate::camera::{BrownConrady, KannalaBrandt, Lens};
 
     fn steady(lens: Lens) -> Option<f64> {
-        Camera::centred(1600, 1200, 1000.0, lens).steady_px()
+        Camera::centred(1600, 1200, 1000.0, lens).monotonic_px()
     }
 
     #[test]

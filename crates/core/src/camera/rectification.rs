@@ -8,7 +8,7 @@ use super::undistortion::{Field, Undistortion, UndistortionError};
 use super::{Camera, Pose};
 
 /// Smallest angle between the baseline and the axes, rad. Below it, there is no common side-by-side view.
-const LEAST_ANGLE_RAD: f64 = 0.1;
+const MIN_ANGLE_RAD: f64 = 0.1;
 
 /// Why two cameras cannot be rectified. Messages contain the remedy.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -16,7 +16,7 @@ const LEAST_ANGLE_RAD: f64 = 0.1;
 pub enum RectificationError {
     /// The cameras have no baseline.
     #[error("both cameras are at the same position")]
-    SamePlace,
+    Coincident,
     /// The cameras look in too different directions.
     #[error(
         "the viewing directions differ by {degrees:.0}°, so no rectified view covers what both cameras see"
@@ -72,7 +72,7 @@ impl Rectification {
         let (view_from_rig, baseline_mm) = common_frame(poses)?;
         let view = |(camera, pose): (&Camera, Pose), field: Field| {
             let turn = view_from_rig * pose.rotation.conjugate();
-            Undistortion::turned(camera, turn, size_px, field)
+            Undistortion::rotated(camera, turn, size_px, field)
         };
         let [first, second] = cameras;
         let focal = [view(first, field)?, view(second, field)?].map(|v| v.view().focal_px.x);
@@ -117,9 +117,9 @@ fn common_frame(poses: [Pose; 2]) -> Result<(DQuat, DVec3), RectificationError> 
     let upright = DQuat::from_rotation_arc(axes[0], forward) * rotations[0];
     let [right, down] = [DVec3::X, DVec3::Y].map(|axis| upright * axis);
     let apart = to - from;
-    let along = apart.try_normalize().ok_or(RectificationError::SamePlace)?;
+    let along = apart.try_normalize().ok_or(RectificationError::Coincident)?;
     let to_axis = along.angle_between(forward);
-    if to_axis.min(std::f64::consts::PI - to_axis) < LEAST_ANGLE_RAD {
+    if to_axis.min(std::f64::consts::PI - to_axis) < MIN_ANGLE_RAD {
         return Err(RectificationError::Behind);
     }
     let is_beside = along.dot(right).abs() >= along.dot(down).abs();
@@ -176,7 +176,7 @@ mod tests {
                 // The maps lead to the positions where the cameras themselves see the point.
                 for (index, (camera, pose), pixel) in [(0, cameras[0], a), (1, cameras[1], b)] {
                     let seen = camera.project(pose.apply(point)).unwrap();
-                    assert!(made.views[index].place(pixel).unwrap().distance(seen) < 1e-6);
+                    assert!(made.views[index].source(pixel).unwrap().distance(seen) < 1e-6);
                 }
             }
         }
@@ -211,7 +211,7 @@ mod tests {
             )
         };
         let sideways = DVec3::new(-100.0, 0.0, 0.0);
-        assert_eq!(made(DQuat::IDENTITY, DVec3::ZERO), Err(RectificationError::SamePlace));
+        assert_eq!(made(DQuat::IDENTITY, DVec3::ZERO), Err(RectificationError::Coincident));
         assert_eq!(made(DQuat::IDENTITY, DVec3::Z), Err(RectificationError::Behind));
         let apart = made(DQuat::from_rotation_y(3.0), sideways).unwrap_err();
         assert!(matches!(apart, RectificationError::Apart { .. }));

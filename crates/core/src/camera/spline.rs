@@ -85,15 +85,15 @@ pub struct Knots {
     /// Degree + 1.
     order: usize,
     /// Values of B along columns and rows.
-    along: [[f64; MOST_ORDER]; 2],
+    along: [[f64; MAX_ORDER]; 2],
 }
 
 /// Largest number of knots along one axis that affect a point.
-const MOST_ORDER: usize = 4;
+const MAX_ORDER: usize = 4;
 
 /// Largest number of parameters that affect the image of a point.
 #[doc(hidden)]
-pub const MOST_TOUCHED: usize = 2 * MOST_ORDER * MOST_ORDER;
+pub const MAX_TOUCHED: usize = 2 * MAX_ORDER * MAX_ORDER;
 
 impl Knots {
     /// Returns the indices, row by row, with their weights.
@@ -182,7 +182,7 @@ impl SplineGrid {
     }
 
     /// Returns the knots at a point u, and the derivatives of their weights along u, 1/h.
-    fn at(&self, u: DVec2) -> (Knots, [[f64; MOST_ORDER]; 2]) {
+    fn at(&self, u: DVec2) -> (Knots, [[f64; MAX_ORDER]; 2]) {
         let middle = DVec2::new((self.columns - 1) as f64, (self.rows - 1) as f64) / 2.0;
         let place = (u / self.distance() + middle).to_array();
         let of = |axis: usize| basis(self.degree, place[axis], [self.columns, self.rows][axis]);
@@ -197,9 +197,9 @@ impl SplineGrid {
 struct Basis {
     /// Index of the first one.
     first: usize,
-    value: [f64; MOST_ORDER],
+    value: [f64; MAX_ORDER],
     /// Derivatives by the coordinate.
-    slope: [f64; MOST_ORDER],
+    slope: [f64; MAX_ORDER],
 }
 
 /// Degree 3, with t from the previous knot, 0 to 1:
@@ -388,7 +388,7 @@ impl LensLaw for Spline {
     }
 
     /// Returns the smallest radius at which the spline folds, over all directions in which it is determined.
-    fn steady_radius(&self) -> Option<f64> {
+    fn monotonic_radius(&self) -> Option<f64> {
         let (reach, step) = (self.grid.reach(), self.grid.distance() / STEPS_A_KNOT);
         let fold = |direction: usize| {
             let along =

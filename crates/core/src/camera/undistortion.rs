@@ -10,7 +10,7 @@ use super::Camera;
 const WIDEST_RAD: f64 = 150.0 / 180.0 * std::f64::consts::PI;
 
 /// Widest possible pinhole view: a pinhole sees less than 180°, and resolves almost nothing at its border.
-const MOST_RAD: f64 = 179.0 / 180.0 * std::f64::consts::PI;
+const MAX_RAD: f64 = 179.0 / 180.0 * std::f64::consts::PI;
 
 /// Number of bisections of the ratio of two focal lengths.
 const HALVINGS: usize = 60;
@@ -63,7 +63,7 @@ pub enum UndistortionError {
 /// let lens = BrownConrady { radial: [-0.2, 0.05, 0.0], ..BrownConrady::default() };
 /// let camera = Camera::centred(1280, 960, 900.0, Lens::BrownConrady(lens));
 /// let view = Undistortion::new(&camera, [1280, 960], Field::Inside)?;
-/// let corner = view.place(DVec2::ZERO).unwrap();
+/// let corner = view.source(DVec2::ZERO).unwrap();
 /// assert!(camera.sees(corner, 0.0));
 /// # Ok::<(), deltille_core::camera::UndistortionError>(())
 /// ```
@@ -91,7 +91,7 @@ impl Undistortion {
         size_px: [u32; 2],
         field: Field,
     ) -> Result<Self, UndistortionError> {
-        Self::turned(camera, DQuat::IDENTITY, size_px, field)
+        Self::rotated(camera, DQuat::IDENTITY, size_px, field)
     }
 
     /// Creates a view in another direction: `view_from_camera` rotates directions of the camera frame to that of the
@@ -99,7 +99,7 @@ impl Undistortion {
     ///
     /// # Errors
     /// Returns an error if no pinhole shows the field.
-    pub fn turned(
+    pub fn rotated(
         camera: &Camera,
         view_from_camera: DQuat,
         [width, height]: [u32; 2],
@@ -114,7 +114,7 @@ impl Undistortion {
         let half = f64::from(width) / 2.0;
         let focal = match field {
             Field::Focal(focal) => focal,
-            Field::Horizontal(rad) if rad < MOST_RAD => half / (rad / 2.0).tan(),
+            Field::Horizontal(rad) if rad < MAX_RAD => half / (rad / 2.0).tan(),
             Field::Horizontal(rad) => {
                 return Err(UndistortionError::TooWide { degrees: rad.to_degrees() });
             }
@@ -149,7 +149,7 @@ impl Undistortion {
     }
 
     /// Returns the position of a view pixel in the camera's image, px; `None` if it has none.
-    pub fn place(&self, pixel: DVec2) -> Option<DVec2> {
+    pub fn source(&self, pixel: DVec2) -> Option<DVec2> {
         let flat = (pixel - self.view.centre_px) / self.view.focal_px;
         let direction = self.view_from_camera.conjugate() * flat.extend(1.0).normalize();
         if direction.angle_between(DVec3::Z) >= self.steady_rad {
@@ -165,9 +165,13 @@ impl Undistortion {
         let [width, height] = [self.view.width, self.view.height].map(|side| side as usize);
         let place = |at: usize| {
             let pixel = DVec2::new((at % width) as f64, (at / width) as f64);
-            self.place(pixel).map_or([f32::NAN; 2], |place| place.as_vec2().to_array())
+            self.source(pixel).map_or([f32::NAN; 2], |place| place.as_vec2().to_array())
         };
-        PixelMap { width, height, places: (0..width * height).into_par_iter().map(place).collect() }
+        PixelMap {
+            width,
+            height,
+            positions: (0..width * height).into_par_iter().map(place).collect(),
+        }
     }
 
     /// Returns the shortest focal length at which all pixels have a position, but not shorter than that of the widest
@@ -175,7 +179,7 @@ impl Undistortion {
     fn focal_inside(&self) -> Result<f64, UndistortionError> {
         let is_inside = |focal: f64| {
             let view = self.clone().with_focal(focal);
-            view.view.border(ALONG).all(|pixel| view.place(pixel).is_some())
+            view.view.border(ALONG).all(|pixel| view.source(pixel).is_some())
         };
         let mut low = self.view.focal_px.x;
         if is_inside(low) {
@@ -222,7 +226,7 @@ impl Undistortion {
 
 /// Returns the angle from the axis at which a lens folds back, rad; π if it does not.
 fn steady_rad(camera: &Camera) -> f64 {
-    let Some(radius) = camera.lens.steady_radius() else { return std::f64::consts::PI };
+    let Some(radius) = camera.lens.monotonic_radius() else { return std::f64::consts::PI };
     let around = (0..32).map(|i| DVec2::from_angle(f64::from(i) / 32.0 * std::f64::consts::TAU));
     let rays = around.filter_map(|at| camera.lens.ray(STEADY_PART * radius * at));
     let angles = rays.map(|ray| ray.direction.angle_between(DVec3::Z));
@@ -247,7 +251,7 @@ impl Camera {
 pub struct PixelMap {
     width: usize,
     height: usize,
-    places: Vec<[f32; 2]>,
+    positions: Vec<[f32; 2]>,
 }
 
 impl PixelMap {
@@ -262,22 +266,22 @@ impl PixelMap {
     }
 
     /// Returns the position x, y, px, of each pixel, row by row; NaN if it has none.
-    pub fn places(&self) -> &[[f32; 2]] {
-        &self.places
+    pub fn positions(&self) -> &[[f32; 2]] {
+        &self.positions
     }
 
     /// Returns the fraction of pixels that have a position.
-    pub fn covered(&self) -> f64 {
-        let count = self.places.iter().filter(|place| !place[0].is_nan()).count();
-        count as f64 / self.places.len().max(1) as f64
+    pub fn valid_fraction(&self) -> f64 {
+        let count = self.positions.iter().filter(|place| !place[0].is_nan()).count();
+        count as f64 / self.positions.len().max(1) as f64
     }
 
     /// Returns the largest rectangle, x, y, width, height in px, in which all pixels have a position; empty if there
     /// is none.
-    pub fn whole_rectangle(&self) -> [usize; 4] {
+    pub fn valid_rectangle(&self) -> [usize; 4] {
         let mut best = [0; 4];
         let mut heights = vec![0; self.width + 1];
-        for (row, places) in self.places.chunks(self.width.max(1)).enumerate() {
+        for (row, places) in self.positions.chunks(self.width.max(1)).enumerate() {
             for (height, place) in heights.iter_mut().zip(places) {
                 *height = if place[0].is_nan() { 0 } else { *height + 1 };
             }
@@ -325,10 +329,10 @@ mod tests {
                 (DQuat::IDENTITY, Field::Whole),
                 (turn, Field::Horizontal(1.0)),
             ] {
-                let made = Undistortion::turned(&camera, turn, [640, 480], field).unwrap();
+                let made = Undistortion::rotated(&camera, turn, [640, 480], field).unwrap();
                 let (mut seen, mut worst): (_, f64) = (0, 0.0);
                 for pixel in made.view.border(ALONG).chain([DVec2::new(300.0, 200.0)]) {
-                    let Some(place) = made.place(pixel) else { continue };
+                    let Some(place) = made.source(pixel) else { continue };
                     let ray = camera.unproject(place).unwrap().direction;
                     let back = made.view.project(1e3 * (turn * ray)).unwrap();
                     worst = worst.max(back.distance(pixel));
@@ -345,10 +349,10 @@ mod tests {
             let camera = Camera::centred(800, 600, 420.0, lens);
             let inside = Undistortion::new(&camera, [800, 600], Field::Inside).unwrap();
             let map = inside.map();
-            assert_eq!(map.whole_rectangle(), [0, 0, 800, 600]);
+            assert_eq!(map.valid_rectangle(), [0, 0, 800, 600]);
             // A slightly wider view is too wide.
             let wider = inside.clone().with_focal(0.995 * inside.view.focal_px.x).map();
-            assert!(wider.covered() < 1.0);
+            assert!(wider.valid_fraction() < 1.0);
             let whole = Undistortion::new(&camera, [800, 600], Field::Whole).unwrap();
             assert!(whole.view.focal_px.x < inside.view.focal_px.x);
             for pixel in camera.border(ALONG) {
@@ -365,8 +369,8 @@ mod tests {
         let lens = BrownConrady { radial: [-0.5, 0.0, 0.0], ..BrownConrady::default() };
         let camera = Camera::centred(1200, 900, 600.0, Lens::BrownConrady(lens));
         let wide = Undistortion::new(&camera, [1200, 900], Field::Horizontal(2.0)).unwrap();
-        assert!(wide.place(DVec2::new(599.5 + 0.8 * wide.view.focal_px.x, 449.5)).is_some());
-        assert!(wide.place(DVec2::new(599.5 + 0.85 * wide.view.focal_px.x, 449.5)).is_none());
+        assert!(wide.source(DVec2::new(599.5 + 0.8 * wide.view.focal_px.x, 449.5)).is_some());
+        assert!(wide.source(DVec2::new(599.5 + 0.85 * wide.view.focal_px.x, 449.5)).is_none());
     }
 
     #[test]
@@ -374,8 +378,8 @@ mod tests {
         let picture = ["..####", ".#####", "######", "..###."];
         let place = |c| if c == '#' { [0.0; 2] } else { [f32::NAN; 2] };
         let places = picture.iter().flat_map(|row| row.chars().map(place)).collect();
-        let map = PixelMap { width: 6, height: 4, places };
-        assert_eq!(map.whole_rectangle(), [2, 0, 4, 3]);
-        assert!((map.covered() - 18.0 / 24.0).abs() < 1e-12);
+        let map = PixelMap { width: 6, height: 4, positions: places };
+        assert_eq!(map.valid_rectangle(), [2, 0, 4, 3]);
+        assert!((map.valid_fraction() - 18.0 / 24.0).abs() < 1e-12);
     }
 }

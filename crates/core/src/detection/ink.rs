@@ -44,8 +44,8 @@ pub struct InkEstimate {
     #[serde(deserialize_with = "quantity::figure::de")]
     pub edges: f64,
     /// Standard deviation of the spread, in edge lengths of a tile.
-    #[serde(deserialize_with = "quantity::deviation::de")]
-    pub edges_deviation: f64,
+    #[serde(alias = "edges_deviation", deserialize_with = "quantity::deviation::de")]
+    pub edges_sd: f64,
     /// Spread in µm on the print, if the target is known.
     #[serde(
         default,
@@ -57,13 +57,15 @@ pub struct InkEstimate {
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
+        alias = "um_deviation",
         deserialize_with = "quantity::deviation::de"
     )]
-    pub um_deviation: Option<f64>,
+    pub um_sd: Option<f64>,
     /// Whether the spread differs significantly from zero. Only then was it used to locate corners.
     pub used: bool,
     /// Number of images it was estimated from.
-    pub pictures: u32,
+    #[serde(alias = "pictures")]
+    pub images: u32,
 }
 
 /// χ² with one degree of freedom that noise exceeds once in a thousand cases.
@@ -75,12 +77,12 @@ const SD_OVER_MEDIAN_DEVIATION: f64 = 1.4826;
 const MEDIAN_SD_OVER_MEAN_SD: f64 = 1.2533;
 
 /// Lower limit for the standard deviation of one image, in edge lengths.
-const LEAST_DEVIATION: f64 = 1e-9;
+const MIN_DEVIATION: f64 = 1e-9;
 
 impl InkEstimate {
     /// Creates the estimate of one image, in edge lengths of a tile, with its standard deviation.
-    pub fn new(edges: f64, edges_deviation: f64, used: bool) -> Self {
-        Self { edges, edges_deviation, um: None, um_deviation: None, used, pictures: 1 }
+    pub fn new(edges: f64, edges_sd: f64, used: bool) -> Self {
+        Self { edges, edges_sd, um: None, um_sd: None, used, images: 1 }
     }
 
     /// Combines estimates from images of one print by their weighted median, so that an image of something else has
@@ -90,15 +92,15 @@ impl InkEstimate {
         // Estimates that already combine all images are equal; they count once.
         let mut pictures = pictures.to_vec();
         pictures.sort_by(|a, b| a.edges.total_cmp(&b.edges));
-        pictures.dedup_by(|a, b| a.pictures > 1 && *a == *b);
-        let weight = |p: &Self| p.edges_deviation.max(LEAST_DEVIATION).powi(-2);
+        pictures.dedup_by(|a, b| a.images > 1 && *a == *b);
+        let weight = |p: &Self| p.edges_sd.max(MIN_DEVIATION).powi(-2);
         let total: f64 = pictures.iter().map(weight).sum();
         let mut below = 0.0;
         let middle = *pictures.iter().find(|picture| {
             below += weight(picture);
             below >= 0.5 * total
         })?;
-        let count = pictures.iter().map(|picture| picture.pictures).fold(0, u32::saturating_add);
+        let count = pictures.iter().map(|picture| picture.images).fold(0, u32::saturating_add);
         if pictures.len() == 1 {
             return Some(middle);
         }
@@ -110,10 +112,10 @@ impl InkEstimate {
             um.filter(|um| um.is_finite())
         };
         Some(Self {
-            edges_deviation: deviation,
-            um_deviation: um(deviation),
+            edges_sd: deviation,
+            um_sd: um(deviation),
             used: middle.edges.powi(2) > CHI2 * deviation.powi(2),
-            pictures: count,
+            images: count,
             ..middle
         })
     }
@@ -121,16 +123,16 @@ impl InkEstimate {
     /// Adds the spread in µm for a print whose tiles have edges of `edge_mm`.
     pub fn on_print(self, edge_mm: f64) -> Self {
         let um = |edges: f64| Some(1e3 * edge_mm * edges);
-        Self { um: um(self.edges), um_deviation: um(self.edges_deviation), ..self }
+        Self { um: um(self.edges), um_sd: um(self.edges_sd), ..self }
     }
 }
 
 impl std::fmt::Display for InkEstimate {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let grown = if self.edges < 0.0 { "shrunk" } else { "grown" };
-        let (by, deviation, unit) = match self.um.zip(self.um_deviation) {
+        let (by, deviation, unit) = match self.um.zip(self.um_sd) {
             Some((um, deviation)) => (um.abs(), deviation, "µm"),
-            None => (100.0 * self.edges.abs(), 100.0 * self.edges_deviation, "% of an edge"),
+            None => (100.0 * self.edges.abs(), 100.0 * self.edges_sd, "% of an edge"),
         };
         let places = places(deviation);
         write!(
@@ -145,15 +147,8 @@ mod tests {
     use super::*;
 
     fn seen(edges: f64, deviation: f64) -> InkEstimate {
-        let (um, um_deviation) = (None, None);
-        let ink = InkEstimate {
-            edges,
-            edges_deviation: deviation,
-            um,
-            um_deviation,
-            used: true,
-            pictures: 1,
-        };
+        let (um, um_sd) = (None, None);
+        let ink = InkEstimate { edges, edges_sd: deviation, um, um_sd, used: true, images: 1 };
         ink.on_print(20.0)
     }
 
@@ -161,8 +156,8 @@ mod tests {
     fn combined_estimate_ignores_an_outlier() {
         let pictures = [0.0031, 0.0029, 0.0030, 0.0032, 0.0028, 0.0300].map(|e| seen(e, 1e-4));
         let all = InkEstimate::of_all(&pictures).unwrap();
-        assert!((all.edges - 0.0030).abs() < 1.5e-4 && all.pictures == 6 && all.used, "{all:?}");
-        assert!((0.3e-4..2e-4).contains(&all.edges_deviation), "{all:?}");
+        assert!((all.edges - 0.0030).abs() < 1.5e-4 && all.images == 6 && all.used, "{all:?}");
+        assert!((0.3e-4..2e-4).contains(&all.edges_sd), "{all:?}");
         assert_eq!(InkEstimate::of_all(&[all, all, all]), Some(all));
         assert_eq!(InkEstimate::of_all(&[]), None);
         let noise = InkEstimate::of_all(&[seen(1e-4, 1e-4), seen(-2e-4, 1e-4)]).unwrap();

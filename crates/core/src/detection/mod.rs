@@ -15,7 +15,7 @@ pub use ink::{Ink, InkEstimate};
 pub use reason::{Reason, ReasonKind};
 pub use tone::{Curve, Piece, TERMS, TONE_PARAMS, Tone, ToneEstimate};
 pub use values::{DecodedTag, Detection, Grid, GridCorner};
-pub use watch::{Glance, Watch};
+pub use watch::{FrameStatus, Watch};
 
 /// Shortest median edge of an accepted grid without a confirming tag, px. In smaller tiles blur leaves only the
 /// fundamental wave, which is the same for squares, dots and threads.

@@ -217,7 +217,7 @@ impl fmt::Display for Reason {
             }
             ReasonKind::SeenTwice => write!(
                 f,
-                "{} left out, because the same panel appears elsewhere in the image; is there a second copy of the target?",
+                "{} excluded, because the same panel appears elsewhere in the image; is there a second copy of the target?",
                 count("corners", "corner")
             ),
             ReasonKind::TooManyGrids => {

@@ -86,8 +86,8 @@ pub struct ToneEstimate {
     #[serde(deserialize_with = "quantity::figure::de")]
     pub kappa: f64,
     /// Standard deviation of κ₀.
-    #[serde(deserialize_with = "quantity::deviation::de")]
-    pub kappa_deviation: f64,
+    #[serde(alias = "kappa_deviation", deserialize_with = "quantity::deviation::de")]
+    pub kappa_sd: f64,
     /// The next coefficient of the curve, κ₁.
     #[serde(deserialize_with = "quantity::figure::de")]
     pub kappa_odd: f64,
@@ -98,8 +98,8 @@ pub struct ToneEstimate {
 impl ToneEstimate {
     /// Creates a curve between black and white, relative to full scale, from its curvature κ₀ and the standard
     /// deviation of κ₀. It is marked as not used, and κ₁ is 0.
-    pub fn new([black, white]: [f64; 2], kappa: f64, kappa_deviation: f64) -> Self {
-        Self { black, white, kappa, kappa_deviation, kappa_odd: 0.0, used: false }
+    pub fn new([black, white]: [f64; 2], kappa: f64, kappa_sd: f64) -> Self {
+        Self { black, white, kappa, kappa_sd, kappa_odd: 0.0, used: false }
     }
 }
 

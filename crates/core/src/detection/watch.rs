@@ -15,7 +15,7 @@ const STILL: f64 = 0.004;
 const ELSEWHERE: f64 = 0.08;
 
 /// Fewest labelled corners of a kept image: enough for a homography with redundancy.
-const FEWEST_CORNERS: usize = 12;
+const MIN_CORNERS: usize = 12;
 
 /// Watches a sequence of images.
 ///
@@ -23,7 +23,7 @@ const FEWEST_CORNERS: usize = 12;
 /// use deltille_core::detection::{Detection, Watch};
 ///
 /// let mut watch = Watch::default();
-/// let seen = watch.look(&Detection::new("black", [640, 480], Vec::new()));
+/// let seen = watch.observe(&Detection::new("black", [640, 480], Vec::new()));
 /// assert!(!seen.is_worth_keeping());
 /// ```
 #[derive(Clone, Debug, Default)]
@@ -38,7 +38,7 @@ type Positions = BTreeMap<(u32, u32), DVec2>;
 /// Assessment of an image in a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub struct Glance {
+pub struct FrameStatus {
     /// Number of labelled corners.
     pub corners: usize,
     /// Whether the corners have not moved since the previous image.
@@ -47,16 +47,16 @@ pub struct Glance {
     pub is_new: bool,
 }
 
-impl Glance {
+impl FrameStatus {
     /// Returns whether the image is worth keeping.
     pub fn is_worth_keeping(self) -> bool {
-        self.corners >= FEWEST_CORNERS && self.is_still && self.is_new
+        self.corners >= MIN_CORNERS && self.is_still && self.is_new
     }
 }
 
 impl Watch {
     /// Assesses the next image. If it is worth keeping, later images are compared with it.
-    pub fn look(&mut self, found: &Detection) -> Glance {
+    pub fn observe(&mut self, found: &Detection) -> FrameStatus {
         let labelled = found.grids.iter().filter_map(|grid| Some((grid.panel?, grid)));
         let positions: Positions = labelled
             .flat_map(|(panel, grid)| {
@@ -66,7 +66,7 @@ impl Watch {
                 })
             })
             .collect();
-        let glance = Glance {
+        let glance = FrameStatus {
             corners: positions.len(),
             is_still: moved(&positions, &self.last) < STILL,
             is_new: self.kept.iter().all(|kept| moved(&positions, kept) > ELSEWHERE),
@@ -117,8 +117,9 @@ mod tests {
     #[test]
     fn images_are_kept_once_per_still_position() {
         let mut watch = Watch::default();
-        let mut keeps =
-            |corners, shift, panel| watch.look(&picture(corners, shift, panel)).is_worth_keeping();
+        let mut keeps = |corners, shift, panel| {
+            watch.observe(&picture(corners, shift, panel)).is_worth_keeping()
+        };
         // The first image has no predecessor; the third repeats the position of the second.
         let shifts = [0.0, 1.0, 2.0, 200.0, 230.0, 231.0, 120.0, 121.0];
         let kept = shifts.map(|shift| keeps(30, shift, Some(0)));

@@ -15,7 +15,7 @@
 //! # Ok::<(), deltille_core::family::FamilyError>(())
 //! ```
 //!
-//! The family [`places`] is of a different kind: on its boards every tile has a tag of nine cells, which identify a
+//! The family [`positions`] is of a different kind: on its boards every tile has a tag of nine cells, which identify a
 //! position only together with the neighbouring tags.
 //!
 //! Families of square tags, the AprilTags of checkerboards, are read, decoded, drawn and certified like the others,
@@ -28,7 +28,7 @@
 //!    callbacks to watch and stop a search. The crate `deltille-search` contains the searches;
 //! 3. `check`: proofs about a family, and its comparison with bounds and with natural images;
 //! 4. `tables`: families as files, shipped families, families of other programs;
-//! 5. `decode`: from the cells of a photograph to a tag; [`places`]: codes that identify a position.
+//! 5. `decode`: from the cells of a photograph to a tag; [`positions`]: codes that identify a position.
 //!
 //! `kernels` contains the loops that dominate searches and proofs.
 //!
@@ -45,7 +45,7 @@ mod hex;
 mod kernels;
 mod krawtchouk;
 pub mod lexicode;
-pub mod places;
+pub mod positions;
 mod rules;
 mod tables;
 
@@ -182,26 +182,26 @@ impl Family {
         match shipped::json(name) {
             Some(json) => Self::from_json(json),
             None => aruco::family(name).unwrap_or_else(|| {
-                let shipped = [shipped_names(), square_names(), vec![places::NAME]].concat();
+                let shipped = [shipped_names(), square_names(), vec![positions::NAME]].concat();
                 Err(FamilyError::Unknown { name: name.to_owned(), shipped })
             }),
         }
     }
 
-    /// Creates the family of position codes, see [`places`].
+    /// Creates the family of position codes, see [`positions`].
     fn places() -> Self {
-        let cells = places::cells();
+        let cells = positions::cells();
         let dimension = cells.dimension();
-        let codes = places::first_board();
+        let codes = positions::first_board();
         let fingerprint = fingerprint(cells.kind(), dimension, 1, None, &codes);
         Self {
-            name: places::NAME.to_owned(),
+            name: positions::NAME.to_owned(),
             kind: cells.kind(),
             dimension,
             distance: 1,
             codes,
             rules: Rules::NONE,
-            construction: Construction::Places,
+            construction: Construction::Positions,
             histogram: BTreeMap::new(),
             fingerprint,
             beginnings: Vec::new(),
@@ -211,8 +211,8 @@ impl Family {
 
     /// Returns whether the tags identify a position only together with neighbouring ones, so that every tile has a
     /// tag.
-    pub fn is_of_places(&self) -> bool {
-        self.construction == Construction::Places
+    pub fn is_position_family(&self) -> bool {
+        self.construction == Construction::Positions
     }
 
     /// Parses the text of a family file (`docs/formats.md`, “Family”, schema [`SCHEMA`]).
@@ -276,15 +276,15 @@ impl Family {
 
     /// Returns the code of a tag.
     pub fn code(&self, id: u32) -> Option<u64> {
-        if self.is_of_places() && (id as usize) < self.len() {
-            return Some(places::word(id));
+        if self.is_position_family() && (id as usize) < self.len() {
+            return Some(positions::word(id));
         }
         self.codes.get(id as usize).copied()
     }
 
     /// Returns the number of codes.
     pub fn len(&self) -> usize {
-        let boards = if self.is_of_places() { places::BOARDS as usize } else { 1 };
+        let boards = if self.is_position_family() { positions::BOARDS as usize } else { 1 };
         boards * self.codes.len()
     }
 
@@ -313,7 +313,7 @@ impl Family {
     /// [`Self::correctable`] corrected bits. For position codes, every word is the word of a place. Image content is
     /// rarely that complex: see [`Self::natural_false_positive_rates`].
     pub fn false_positive_rates(&self) -> Vec<f64> {
-        if self.is_of_places() {
+        if self.is_position_family() {
             return vec![1.0];
         }
         false_positive_rates(self.kind, self.used_cells(), self.distance, self.codes.len())

@@ -185,7 +185,7 @@ impl Screen {
     /// Returns whether a word, on its own, may be a code.
     #[inline]
     pub fn admits(&self, word: u64) -> bool {
-        self.look_is_fine(word) && self.is_apart(word ^ self.words.turn(word))
+        self.look_is_fine(word) && self.is_apart(word ^ self.words.rotate(word))
     }
 
     /// Returns whether a word satisfies the rules, apart from the distance to its own rotations.

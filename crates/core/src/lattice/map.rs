@@ -9,26 +9,26 @@ use super::{GridKind, Orientation, Tile, Vertex};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct LatticeMap {
     kind: GridKind,
-    turns: u8,
+    rotations: u8,
     shift: Vertex,
 }
 
 impl LatticeMap {
-    /// Creates a counterclockwise rotation about vertex (0,0) by `turns` times 60° or 90°, followed by a shift.
-    pub fn new(kind: GridKind, turns: i32, shift: Vertex) -> Self {
+    /// Creates a counterclockwise rotation about vertex (0,0) by `rotations` times 60° or 90°, followed by a shift.
+    pub fn new(kind: GridKind, rotations: i32, shift: Vertex) -> Self {
         let full = kind.steps().len() as i32;
-        Self { kind, turns: turns.rem_euclid(full) as u8, shift }
+        Self { kind, rotations: rotations.rem_euclid(full) as u8, shift }
     }
 
-    /// Creates the map with a rotation of `turns` times 60° or 90° that maps `from` to `to`.
-    pub fn taking(kind: GridKind, from: Vertex, to: Vertex, turns: i32) -> Self {
-        let turned = Self::new(kind, turns, Vertex::new(0, 0)).apply(from);
-        Self::new(kind, turns, to - turned)
+    /// Creates the map with a rotation of `rotations` times 60° or 90° that maps `from` to `to`.
+    pub fn taking(kind: GridKind, from: Vertex, to: Vertex, rotations: i32) -> Self {
+        let turned = Self::new(kind, rotations, Vertex::new(0, 0)).apply(from);
+        Self::new(kind, rotations, to - turned)
     }
 
     /// Returns the number of counterclockwise rotations by 60° or 90°.
-    pub fn turns(self) -> u8 {
-        self.turns
+    pub fn rotations(self) -> u8 {
+        self.rotations
     }
 
     /// Returns whether dark tiles map to dark tiles.
@@ -38,18 +38,18 @@ impl LatticeMap {
             GridKind::Deltille => 0,
             GridKind::Checker => row + col,
         };
-        (i32::from(self.turns) + shift) % 2 == 0
+        (i32::from(self.rotations) + shift) % 2 == 0
     }
 
     /// Returns the corresponding rotation of the plane, counterclockwise, rad.
     pub fn angle_rad(self) -> f64 {
-        std::f64::consts::TAU * f64::from(self.turns) / self.kind.steps().len() as f64
+        std::f64::consts::TAU * f64::from(self.rotations) / self.kind.steps().len() as f64
     }
 
     /// Maps the vertex `v`.
     pub fn apply(self, v: Vertex) -> Vertex {
         let (mut row, mut col) = (v.row, v.col);
-        for _ in 0..self.turns {
+        for _ in 0..self.rotations {
             (row, col) = match self.kind {
                 // One rotation maps the column step to the row step, and the row step to row − column.
                 GridKind::Deltille => (row + col, -row),
@@ -65,7 +65,7 @@ impl LatticeMap {
         let [a, b, c] = tile.frame().map(|v| self.apply(v));
         let row = a.row.min(b.row).min(c.row);
         let col = a.col.min(b.col).min(c.col);
-        let orientation = match (tile.orientation, self.turns % 2) {
+        let orientation = match (tile.orientation, self.rotations % 2) {
             (Orientation::Square, _) => Orientation::Square,
             (Orientation::Upright, 0) | (Orientation::Inverted, 1) => Orientation::Upright,
             _ => Orientation::Inverted,
@@ -75,15 +75,15 @@ impl LatticeMap {
 
     /// Returns the inverse map.
     pub fn inverse(self) -> Self {
-        let back = Self::new(self.kind, -i32::from(self.turns), Vertex::new(0, 0));
+        let back = Self::new(self.kind, -i32::from(self.rotations), Vertex::new(0, 0));
         let shift = back.apply(self.shift);
         Self { shift: Vertex::new(-shift.row, -shift.col), ..back }
     }
 
     /// Returns the composition of this map after `first`, on the same lattice.
     pub fn after(self, first: LatticeMap) -> Self {
-        let turns = i32::from(self.turns) + i32::from(first.turns);
-        Self::new(self.kind, turns, self.apply(first.shift))
+        let rotations = i32::from(self.rotations) + i32::from(first.rotations);
+        Self::new(self.kind, rotations, self.apply(first.shift))
     }
 }
 
@@ -102,8 +102,8 @@ mod tests {
     }
 
     prop_compose! {
-        fn maps()(kind in kind(), turns: [u8; 2], shift in [vertex(), vertex()]) -> [LatticeMap; 2] {
-            [0, 1].map(|i| LatticeMap::new(kind, turns[i].into(), shift[i]))
+        fn maps()(kind in kind(), rotations: [u8; 2], shift in [vertex(), vertex()]) -> [LatticeMap; 2] {
+            [0, 1].map(|i| LatticeMap::new(kind, rotations[i].into(), shift[i]))
         }
     }
 
@@ -140,8 +140,8 @@ mod tests {
         }
 
         #[test]
-        fn taking_maps_from_to_to(kind in kind(), from in vertex(), to in vertex(), turns in -9..9) {
-            prop_assert_eq!(LatticeMap::taking(kind, from, to, turns).apply(from), to);
+        fn taking_maps_from_to_to(kind in kind(), from in vertex(), to in vertex(), rotations in -9..9) {
+            prop_assert_eq!(LatticeMap::taking(kind, from, to, rotations).apply(from), to);
         }
     }
 }

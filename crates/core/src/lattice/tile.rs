@@ -37,7 +37,7 @@ impl GridKind {
     }
 
     /// Returns the number of rotations that map a tile onto itself, which is also the number of its vertices.
-    pub const fn turns(self) -> u8 {
+    pub const fn rotations(self) -> u8 {
         match self {
             Self::Deltille => 3,
             Self::Checker => 4,
@@ -232,7 +232,7 @@ mod tests {
             for kind in KINDS {
                 for tile in kind.tiles_at(Vertex::new(row, col)) {
                     let places = tile.vertices().map(|v| kind.position(v.row.into(), v.col.into()));
-                    let middle = places.sum::<DVec2>() / f64::from(kind.turns());
+                    let middle = places.sum::<DVec2>() / f64::from(kind.rotations());
                     prop_assert_eq!(kind.tile_at(middle), tile);
                 }
             }

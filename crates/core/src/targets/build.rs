@@ -1,4 +1,4 @@
-use crate::family::{Family, places};
+use crate::family::{Family, positions};
 use crate::setting::Setting::{BoardBoardId, SolidBoardId, TargetName};
 use crate::targets::boards::capacity::TagSettings;
 use crate::targets::boards::{aprilgrid, board, charuco, circles, tag_sheet};
@@ -106,7 +106,7 @@ impl Target {
                 (self.tags_of_tiling(kind), other.tags_of_tiling(kind))
                 && family.name == same.name
                 // The codes of a place family follow from the ids of boards.
-                && family.name != places::NAME
+                && family.name != positions::NAME
             {
                 let settings = TagSettings::of(kind, self.tilings().count() > 1);
                 overlap(settings.first_id(), "tag ids", &ids, &others)?;

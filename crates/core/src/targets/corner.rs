@@ -18,14 +18,14 @@ pub struct Corner {
     #[serde(deserialize_with = "quantity::place_in_lattice::de")]
     pub col: i32,
     /// Position in the panel frame, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
+    #[serde(deserialize_with = "quantity::position_mm::de")]
     pub panel_mm: DVec2,
     /// Position in the target frame, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
+    #[serde(deserialize_with = "quantity::position_mm::de")]
     pub target_mm: DVec3,
     /// Measured position on the physical target, if available. The positions above are the planned ones.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub measured: Option<MeasuredPlace>,
+    pub measured: Option<MeasuredPosition>,
 }
 
 impl Corner {
@@ -40,9 +40,9 @@ impl Corner {
 /// Offsets are relative to the plan after it was fitted to the corners by position, rotation and scale.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct MeasuredPlace {
+pub struct MeasuredPosition {
     /// Offset from the plan, along the axes of the panel frame, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
+    #[serde(deserialize_with = "quantity::position_mm::de")]
     pub offset_mm: DVec3,
     /// Covariance of the offset, mm²: xx, xy, xz, yy, yz, zz.
     #[serde(deserialize_with = "quantity::figure::de")]

@@ -65,7 +65,7 @@ fn hash(panels: &[Panel], family: Option<&FamilyRef>, with_positions: bool) -> F
         for corner in &panel.corners {
             hash.update(format!("corner {} {}", corner.row, corner.col));
             if with_positions {
-                let [x, y, z] = panel.place_mm(corner).to_array().map(quanta);
+                let [x, y, z] = panel.position_mm(corner).to_array().map(quanta);
                 hash.update(format!(" {x} {y} {z}"));
             }
             hash.update("\n");
@@ -92,7 +92,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::targets::{BoardSpec, MeasuredPlace};
+    use crate::targets::{BoardSpec, MeasuredPosition};
 
     fn board(name: &str, edit: impl Fn(&mut BoardSpec)) -> Target {
         let mut spec = BoardSpec::deltille(5, 6, 20.0);
@@ -123,7 +123,7 @@ mod tests {
         let plan = board("desk", |_| {});
         let mut measured = Target { plan: Some(plan.identity()), ..plan.clone() };
         let place =
-            MeasuredPlace { offset_mm: DVec3::new(0.01, 0.0, 0.0), covariance_mm2: [0.0; 6] };
+            MeasuredPosition { offset_mm: DVec3::new(0.01, 0.0, 0.0), covariance_mm2: [0.0; 6] };
         measured.panels[0].corners[3].measured = Some(place);
         let read = Target::from_json(&measured.to_json()).unwrap();
         assert_eq!(read.plan, Some(plan.identity()));

@@ -35,10 +35,10 @@ mod target;
 pub use crate::Name;
 pub use crate::identity::{Fingerprint, TargetIdentity, check_result_of, check_same_board};
 pub use boards::{
-    AprilGridSpec, BORDER_BITS, BoardSpec, CharucoSpec, CirclesSpec, MOST_ROWS, SIDES,
-    TagSheetSpec, TagSpec, board_vertices, least_untagged_corners, zigzag_vertices,
+    AprilGridSpec, BORDER_BITS, BoardSpec, CharucoSpec, CirclesSpec, MAX_ROWS, SIDES, TagSheetSpec,
+    TagSpec, board_vertices, least_untagged_corners, zigzag_vertices,
 };
-pub use corner::{Corner, MeasuredPlace};
+pub use corner::{Corner, MeasuredPosition};
 pub use error::TargetError;
 pub use family_ref::{FamilyRef, OtherFamily, UnknownCodes};
 pub use json::{SCHEMA, TargetFileError};

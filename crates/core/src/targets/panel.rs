@@ -206,7 +206,7 @@ impl Panel {
     }
 
     /// Converts coordinates of a tile to a position in the panel frame, in edges: see [`Tile::frame`].
-    pub fn place_in_tile(&self, tile: Tile, DVec2 { x: u, y: v }: DVec2) -> DVec2 {
+    pub fn position_in_tile(&self, tile: Tile, DVec2 { x: u, y: v }: DVec2) -> DVec2 {
         if self.gap_edges.is_none() {
             let (row, col) = (f64::from(tile.anchor.row), f64::from(tile.anchor.col));
             return self.kind.position(row + v, col + u);
@@ -226,7 +226,7 @@ impl Panel {
     }
 
     /// Returns the position of a corner in the target frame, mm: the measured one, or else the planned one.
-    pub fn place_mm(&self, corner: &Corner) -> DVec3 {
+    pub fn position_mm(&self, corner: &Corner) -> DVec3 {
         corner.target_mm + self.pose.matrix() * corner.offset_mm()
     }
 

@@ -17,7 +17,7 @@ pub struct PanelPose {
     #[serde(deserialize_with = "quantity::cosine::de")]
     pub rotation: [f64; 9],
     /// Translation, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
+    #[serde(deserialize_with = "quantity::position_mm::de")]
     pub translation_mm: DVec3,
     /// Covariance of a small rotation (rad) and translation (mm) along the target's axes, if the pose was measured.
     #[serde(

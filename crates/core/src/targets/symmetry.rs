@@ -34,10 +34,10 @@ impl Panel {
 /// Returns the symmetries of corners at these vertices.
 pub fn symmetries(kind: GridKind, vertices: impl IntoIterator<Item = Vertex>) -> Vec<LatticeMap> {
     let vertices: BTreeSet<Vertex> = vertices.into_iter().collect();
-    let of_turns = |turns: i32| {
-        let turned = LatticeMap::new(kind, turns, Vertex::new(0, 0));
+    let of_turns = |rotations: i32| {
+        let turned = LatticeMap::new(kind, rotations, Vertex::new(0, 0));
         let first = vertices.iter().map(|&v| turned.apply(v)).min()?;
-        let map = LatticeMap::new(kind, turns, *vertices.first()? - first);
+        let map = LatticeMap::new(kind, rotations, *vertices.first()? - first);
         let is_onto = vertices.iter().all(|&v| vertices.contains(&map.apply(v)));
         (is_onto && map.keeps_colours()).then_some(map)
     };
@@ -51,20 +51,20 @@ mod tests {
 
     #[test]
     fn symmetries_of_boards() {
-        let turns = |kind, rows, cols| -> Vec<u8> {
+        let rotations = |kind, rows, cols| -> Vec<u8> {
             let maps = symmetries(kind, board_vertices(kind, rows, cols));
-            maps.into_iter().map(LatticeMap::turns).collect()
+            maps.into_iter().map(LatticeMap::rotations).collect()
         };
         for (rows, cols, expected) in
             [(4, 6, &[2][..]), (5, 7, &[2]), (4, 7, &[]), (6, 6, &[1, 2, 3]), (7, 7, &[2])]
         {
-            assert_eq!(turns(GridKind::Checker, rows, cols), expected, "{rows} × {cols}");
+            assert_eq!(rotations(GridKind::Checker, rows, cols), expected, "{rows} × {cols}");
         }
         for (rows, cols) in [(4, 5), (4, 6), (5, 5), (7, 10)] {
-            assert!(turns(GridKind::Deltille, rows, cols).is_empty(), "{rows} × {cols}");
+            assert!(rotations(GridKind::Deltille, rows, cols).is_empty(), "{rows} × {cols}");
         }
         let triangle = (0..6).flat_map(|row| (0..6 - row).map(move |col| Vertex::new(row, col)));
         let of_triangle = symmetries(GridKind::Deltille, triangle);
-        assert_eq!(of_triangle.into_iter().map(LatticeMap::turns).collect::<Vec<_>>(), [2, 4]);
+        assert_eq!(of_triangle.into_iter().map(LatticeMap::rotations).collect::<Vec<_>>(), [2, 4]);
     }
 }

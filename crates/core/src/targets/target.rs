@@ -5,7 +5,7 @@ use crate::lattice::GridKind;
 use crate::targets::boards::capacity;
 use crate::targets::family_ref::Codes;
 use crate::targets::{
-    FamilyRef, MeasuredPlace, Name, OtherFamily, Panel, PanelPose, TargetIdentity, TargetSpec,
+    FamilyRef, MeasuredPosition, Name, OtherFamily, Panel, PanelPose, TargetIdentity, TargetSpec,
     UnknownCodes,
 };
 
@@ -172,7 +172,7 @@ impl Target {
         let corners = self.panels.iter().flat_map(|panel| &panel.corners);
         let places = corners.filter_map(|corner| corner.measured);
         let variances =
-            places.map(|MeasuredPlace { covariance_mm2: [xx, _, _, yy, _, zz], .. }| {
+            places.map(|MeasuredPosition { covariance_mm2: [xx, _, _, yy, _, zz], .. }| {
                 (xx + yy + zz) / 3.0
             });
         let (sum, count) = variances.fold((0.0, 0), |(sum, count), v| (sum + v, count + 1));

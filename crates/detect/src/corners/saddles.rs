@@ -32,14 +32,14 @@ const NOISE_FACTOR: f32 = 5.0;
 
 /// Minimum area per corner, px². Tiles of 7 px are the smallest that can be distinguished from waves. Noise has twice
 /// as many candidates.
-const LEAST_TILE_PX2: usize = 40;
+const MIN_TILE_PX2: usize = 40;
 
 /// Maximum number of corners in an image: five times as many as are refined.
-const MOST_CORNERS: usize = 100_000;
+const MAX_CORNERS: usize = 100_000;
 
 /// Maximum number of candidates per level, 2.5 times the number of corners. In images of leaves or grass, nine of ten
 /// candidates are not corners.
-const MOST_CANDIDATES: usize = 250_000;
+const MAX_CANDIDATES: usize = 250_000;
 
 /// A corner with N rays in the image: a monkey saddle, or a saddle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -278,13 +278,13 @@ fn candidates_above_noise<const N: usize>(level: &Gray<i16>, noise: f32) -> Vec<
         let threshold = (PER_AMPLITUDE * noise * noise).min(PART * PART * ninth);
         found.retain(|candidate| candidate.response > threshold);
     }
-    strongest(&mut found, (level.pixels().len() / LEAST_TILE_PX2).min(MOST_CANDIDATES));
+    strongest(&mut found, (level.pixels().len() / MIN_TILE_PX2).min(MAX_CANDIDATES));
     found
 }
 
 /// Returns whether an image has more corners than any board would have in it.
 pub(crate) fn too_many(pyramid: &Pyramid, corners: usize) -> bool {
-    corners > (pyramid.levels()[0].pixels().len() / LEAST_TILE_PX2).min(MOST_CORNERS)
+    corners > (pyramid.levels()[0].pixels().len() / MIN_TILE_PX2).min(MAX_CORNERS)
 }
 
 /// Keeps the `count` strongest candidates, the first of equals.
@@ -398,7 +398,7 @@ fn sample_noise(image: &Gray<i16>) -> SampleNoise {
     /// Number of samples that determines the quiet quantile to 3 %.
     const PLENTY: usize = 8000;
     /// Minimum distance between samples, px: the nine samples of the mask are 8 px wide.
-    const LEAST_STRIDE: usize = 8;
+    const MIN_STRIDE: usize = 8;
     /// Distance of the mask's samples: the radius of the ring.
     const STEP: usize = 4;
     /// Fraction of the image that is assumed to be plain: boards and houses leave little without an edge.
@@ -422,7 +422,7 @@ fn sample_noise(image: &Gray<i16>) -> SampleNoise {
     /// Gain of the mask: √(1+4+1+4+16+4+1+4+1).
     const GAIN: f32 = 6.0;
     let (width, height) = (image.width(), image.height());
-    let stride = (width * height / PLENTY).isqrt().max(LEAST_STRIDE);
+    let stride = (width * height / PLENTY).isqrt().max(MIN_STRIDE);
     let mut magnitudes = Vec::with_capacity((width / stride + 1) * (height / stride + 1));
     for y in (STEP..height.saturating_sub(STEP)).step_by(stride) {
         let rows = [image.row(y - STEP), image.row(y), image.row(y + STEP)];

@@ -27,17 +27,17 @@ use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::raster::Gray;
 
 /// Maximum fraction of pairs of squares beyond a board that differ like black and white.
-const MOST_DIFFERENT: f64 = 0.2;
+const MAX_DIFFERENT: f64 = 0.2;
 
 /// The same beyond rows of corners that are not an area, which random cells form more easily.
-const MOST_DIFFERENT_ROWS: f64 = 0.08;
+const MAX_DIFFERENT_ROWS: f64 = 0.08;
 
 /// The same beyond the complete squares of a grid. Single corners that stand apart may be the rest of a covered board,
 /// with more of it visible beyond. They may also be gaps between dots, which all alternate.
-const MOST_DIFFERENT_SQUARES: f64 = 0.6;
+const MAX_DIFFERENT_SQUARES: f64 = 0.6;
 
 /// Minimum number of pairs for a decision.
-const LEAST_PAIRS: usize = 6;
+const MIN_PAIRS: usize = 6;
 
 /// Number of rows of squares that are tested beyond an end.
 const ROWS: i32 = 2;
@@ -62,11 +62,11 @@ pub(crate) fn go_on(image: &Gray<i16>, grids: &[&Grid]) -> Vec<bool> {
         let goes_on = |tiles: &CheckerTiles, most| tiles.goes_on(is_others, most);
         grid.kind == GridKind::Checker && {
             let all = CheckerTiles::of(image.into(), grid);
-            let most = if all.is_compact() { MOST_DIFFERENT } else { MOST_DIFFERENT_ROWS };
+            let most = if all.is_compact() { MAX_DIFFERENT } else { MAX_DIFFERENT_ROWS };
             goes_on(&all, most) || {
                 let squares = all.without_loose_corners();
                 let stand_apart = squares.corners.len() < all.corners.len();
-                stand_apart && goes_on(&squares, MOST_DIFFERENT_SQUARES)
+                stand_apart && goes_on(&squares, MAX_DIFFERENT_SQUARES)
             }
         }
     };
@@ -92,7 +92,7 @@ impl CheckerTiles<'_> {
                 }
             }
         }
-        pairs >= LEAST_PAIRS && different as f64 >= most * pairs as f64
+        pairs >= MIN_PAIRS && different as f64 >= most * pairs as f64
     }
 
     /// Returns the brightness of the squares beyond the ends in direction `k`, by their lowest, leftmost vertices.

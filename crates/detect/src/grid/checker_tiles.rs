@@ -116,10 +116,10 @@ impl<'a> CheckerTiles<'a> {
     /// Returns the brightness about the centre of a square; `None` outside the image.
     pub(crate) fn value(&self, Square { middle, edges }: Square) -> Option<f64> {
         /// In edges: the centre, and points beside it along rows and columns.
-        const PLACES: [[f64; 2]; 5] =
+        const POSITIONS: [[f64; 2]; 5] =
             [[0.0, 0.0], [AROUND, 0.0], [-AROUND, 0.0], [0.0, AROUND], [0.0, -AROUND]];
-        let values = PLACES.map(|place| self.brightness(moved(middle, edges, place.into())));
-        Some(values.into_iter().sum::<Option<f64>>()? / PLACES.len() as f64)
+        let values = POSITIONS.map(|place| self.brightness(moved(middle, edges, place.into())));
+        Some(values.into_iter().sum::<Option<f64>>()? / POSITIONS.len() as f64)
     }
 
     /// Returns the brightness of a position in the image.

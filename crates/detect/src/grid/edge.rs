@@ -30,7 +30,7 @@ const SQUARE_SIDE: f64 = 0.04;
 const MIN_SIDE_PX: f64 = 1.2;
 
 /// Sine between this edge and the next edges of a tile below which the samples do not follow the slant of the tile.
-const LEAST_ACROSS: f64 = 0.1;
+const MIN_ACROSS: f64 = 0.1;
 
 /// Minimum deviation of a sample from the level, relative to the amplitude of the corners.
 const MIN_DEVIATION: f64 = 0.25;
@@ -129,7 +129,7 @@ fn is_clean_along<const N: usize>(
     let (next_left, next_right) = (next_edges(lefts), next_edges(rights));
     let lean = |[at_a, at_b]: [DVec2; 2], t: f64| {
         let DVec2 { x: ahead, y: across } = (1.0 - t) * at_a + t * at_b;
-        if across.abs() > LEAST_ACROSS { ahead / across } else { 0.0 }
+        if across.abs() > MIN_ACROSS { ahead / across } else { 0.0 }
     };
     let dark_left = i.is_multiple_of(2);
     let amplitude = a.sectors.amplitude.min(b.sectors.amplitude);

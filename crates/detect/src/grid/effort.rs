@@ -3,7 +3,7 @@
 
 /// Maximum number of searches per image, some microseconds each: some hundred times as many as photographs of boards
 /// take, and about a second.
-const MOST_LOOKS: usize = 200_000;
+const MAX_PASSES: usize = 200_000;
 
 /// Remaining searches for an image.
 #[derive(Clone, Copy, Debug)]
@@ -11,7 +11,7 @@ pub(crate) struct Effort(usize);
 
 impl Default for Effort {
     fn default() -> Self {
-        Self(MOST_LOOKS)
+        Self(MAX_PASSES)
     }
 }
 

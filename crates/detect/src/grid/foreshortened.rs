@@ -29,7 +29,7 @@ const DIRECTIONS: usize = 6;
 const WIDTH: f64 = 0.5;
 
 /// Maximum number of pixels of the pyramid level that is used: tiles of larger images are larger.
-const MOST_PIXELS: usize = 2_500_000;
+const MAX_PIXELS: usize = 2_500_000;
 
 /// Tolerance for rounded steps, px: within a row they add up to less than a tenth of a pixel.
 const SLACK_PX: f64 = 0.1;
@@ -47,7 +47,7 @@ pub(crate) fn foreshortened_grids<const N: usize>(
     pyramid: &Pyramid,
 ) -> Vec<SaddleGrid> {
     let levels = pyramid.levels();
-    let fitting = levels.iter().position(|level| level.pixels().len() <= MOST_PIXELS);
+    let fitting = levels.iter().position(|level| level.pixels().len() <= MAX_PIXELS);
     let level = fitting.unwrap_or(levels.len() - 1);
     let is_small = levels[level].width().min(levels[level].height()) < MIN_LEVEL_SIDE;
     if is_small || is_all_noise(&levels[level]) {

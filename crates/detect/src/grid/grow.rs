@@ -218,7 +218,7 @@ mod tests {
     /// one.
     fn linked<const N: usize>(
         vertices: &[Vertex],
-        turns: &[usize],
+        rotations: &[usize],
         lost: &[bool],
     ) -> Vec<Links<N>> {
         let mut links = vec![[None; N]; vertices.len()];
@@ -230,7 +230,7 @@ mod tests {
                 if *lost.next().unwrap() {
                     continue;
                 }
-                let ray = |corner: usize, k: usize| (k + N - turns[corner]) % N;
+                let ray = |corner: usize, k: usize| (k + N - rotations[corner]) % N;
                 let [out, back] = [ray(a, k), ray(b, k + N / 2)];
                 links[a][out] = Some(Link { corner: b, ray: back });
                 links[b][back] = Some(Link { corner: a, ray: out });
@@ -253,12 +253,12 @@ mod tests {
         // Even rays begin dark sectors: on a checkerboard the colours alternate from corner to corner.
         let parity =
             |v: Vertex| if N == CHECKER { (v.row + v.col).rem_euclid(2) as usize } else { 0 };
-        let turns: Vec<usize> = vertices
+        let rotations: Vec<usize> = vertices
             .iter()
             .enumerate()
             .map(|(i, &v)| (2 * (i * seed % N) + parity(v)) % N)
             .collect();
-        let links = linked::<N>(&vertices, &turns, lost);
+        let links = linked::<N>(&vertices, &rotations, lost);
         let (mut growth, mut seen) = (Growth::new(&links), BTreeSet::new());
         for seed in seeds(&links) {
             if seed.iter().any(|placed| growth.taken[placed.corner]) {
@@ -271,9 +271,9 @@ mod tests {
             for Placed { corner, place } in grid {
                 growth.taken[corner] = true;
                 assert!(seen.insert(corner), "corner {corner} has two places");
-                let truth = vertices[root] + turned::<N>(place.vertex, turns[root]);
+                let truth = vertices[root] + turned::<N>(place.vertex, rotations[root]);
                 assert_eq!(truth, vertices[corner]);
-                assert_eq!((place.turn + turns[root]) % N, turns[corner]);
+                assert_eq!((place.turn + rotations[root]) % N, rotations[corner]);
             }
         }
         if !holes.contains(&true) && !lost.contains(&true) {

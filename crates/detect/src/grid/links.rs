@@ -13,7 +13,7 @@ use deltille_core::raster::Pyramid;
 const NEAREST: usize = 36;
 
 /// Squared cosine below that of [`MAX_CHORD_RAD`].
-const LEAST_ALONG: f64 = 0.9;
+const MIN_ALONG: f64 = 0.9;
 
 /// Number of corners that are tested first; inside a board it is sufficient.
 const FIRST: usize = 12;
@@ -110,7 +110,7 @@ impl<const N: usize> Corners<'_, N> {
     fn may_be_along(&self, index: usize, i: usize, place: DVec2) -> bool {
         let off = place - self.saddles[index].position;
         let along = off.dot(self.directions[index][i]);
-        along > 0.0 && along * along >= LEAST_ALONG * off.length_squared()
+        along > 0.0 && along * along >= MIN_ALONG * off.length_squared()
     }
 }
 

@@ -21,10 +21,10 @@ use deltille_core::lattice::{GridKind, Vertex};
 
 /// Standard deviation of the second derivatives, in edges, of a grid that shows none. Over one tile, a steep view or a
 /// wide lens changes the next edge by this much (1σ).
-const USUAL_BEND: f64 = 0.1;
+const TYPICAL_BEND: f64 = 0.1;
 
-/// Weight of [`USUAL_BEND`] in lines of three corners.
-const USUAL_WEIGHT: f64 = 0.25;
+/// Weight of [`TYPICAL_BEND`] in lines of three corners.
+const TYPICAL_WEIGHT: f64 = 0.25;
 
 /// Information, in edges⁻², that is less than a billionth of that of a corner.
 const NO_PRIOR: f64 = 1e-9;
@@ -68,7 +68,7 @@ pub(crate) struct Bend {
 impl Bend {
     /// Returns the bend of a grid of few corners.
     pub(crate) fn usual() -> Self {
-        Self { second: USUAL_BEND, place_px: PLACE_PX }
+        Self { second: TYPICAL_BEND, place_px: PLACE_PX }
     }
 
     /// Returns the bend of a grid of corners with N rays. `at` returns their positions, found on levels up to `level`.
@@ -77,7 +77,7 @@ impl Bend {
         at: impl Fn(Vertex) -> Option<DVec2>,
         level: usize,
     ) -> Self {
-        let (mut sum, mut count) = (USUAL_WEIGHT * USUAL_BEND * USUAL_BEND, USUAL_WEIGHT);
+        let (mut sum, mut count) = (TYPICAL_WEIGHT * TYPICAL_BEND * TYPICAL_BEND, TYPICAL_WEIGHT);
         for vertex in vertices {
             for step in &kind::<N>().steps()[..N / 2] {
                 let line = [vertex - *step, vertex, vertex + *step].map(&at);

@@ -28,12 +28,12 @@ impl WholeBoard {
     /// Returns whether a grid has exactly the board's corners, in any rotation and shift.
     pub(crate) fn is_shown_by<S>(&self, grid: &BTreeMap<Vertex, S>) -> bool {
         grid.len() == self.vertices.len()
-            && (0..self.kind.steps().len() as i32).any(|turns| {
-                let turned = LatticeMap::new(self.kind, turns, Vertex::new(0, 0));
+            && (0..self.kind.steps().len() as i32).any(|rotations| {
+                let turned = LatticeMap::new(self.kind, rotations, Vertex::new(0, 0));
                 let first = grid.keys().map(|&v| turned.apply(v)).min();
                 let shift = self.vertices.first().zip(first).map(|(to, from)| *to - from);
                 shift.is_some_and(|shift| {
-                    let map = LatticeMap::new(self.kind, turns, shift);
+                    let map = LatticeMap::new(self.kind, rotations, shift);
                     grid.keys().all(|&v| self.vertices.contains(&map.apply(v)))
                 })
             })
@@ -51,12 +51,12 @@ pub(crate) fn fit_outline(
         return None;
     }
     let half_turn = if inverted { 3 } else { 0 };
-    let mut fitting = [0, 2, 4].into_iter().filter_map(|turns| {
-        let turned = LatticeMap::new(GridKind::Deltille, turns + half_turn, Vertex::new(0, 0));
+    let mut fitting = [0, 2, 4].into_iter().filter_map(|rotations| {
+        let turned = LatticeMap::new(GridKind::Deltille, rotations + half_turn, Vertex::new(0, 0));
         // Lowest-leftmost corners must coincide.
         let lowest = grid.keys().map(|&v| turned.apply(v)).min()?;
         let map =
-            LatticeMap::new(GridKind::Deltille, turns + half_turn, *outline.first()? - lowest);
+            LatticeMap::new(GridKind::Deltille, rotations + half_turn, *outline.first()? - lowest);
         grid.keys().all(|&v| outline.contains(&map.apply(v))).then_some(map)
     });
     let map = fitting.next()?;
@@ -83,19 +83,20 @@ pub(crate) fn fit_rectangle(
     }
     // Quarter rotations of the labels against the grid's rows and columns: (0, 0) is then at the lower left, lower
     // right, upper right or upper left of the grid.
-    let fitting = (0..4u8)
-        .filter(|turns| size == if turns.is_multiple_of(2) { (rows, cols) } else { (cols, rows) });
-    let origin = move |turns: u8| {
-        let row = if turns >= 2 { high.0 } else { low.0 };
-        let col = if matches!(turns, 1 | 2) { high.1 } else { low.1 };
+    let fitting = (0..4u8).filter(|rotations| {
+        size == if rotations.is_multiple_of(2) { (rows, cols) } else { (cols, rows) }
+    });
+    let origin = move |rotations: u8| {
+        let row = if rotations >= 2 { high.0 } else { low.0 };
+        let col = if matches!(rotations, 1 | 2) { high.1 } else { low.1 };
         Vertex::new(row, col)
     };
     let best = fitting.max_by(|&a, &b| {
-        let key = |turns: u8| {
-            let at = origin(turns);
+        let key = |rotations: u8| {
+            let at = origin(rotations);
             // The square that the first row and column span at (0, 0), in the grid's labels.
-            let square =
-                (at.row - i32::from(turns >= 2)) + (at.col - i32::from(matches!(turns, 1 | 2)));
+            let square = (at.row - i32::from(rotations >= 2))
+                + (at.col - i32::from(matches!(rotations, 1 | 2)));
             let place = grid.get(&at).map_or(DVec2::ZERO, |placed| placed.position);
             ((square.rem_euclid(2) == 0) != inverted, [place.y, -place.x])
         };
@@ -113,11 +114,11 @@ mod tests {
     use crate::grid::saddle_grid::PlacedSaddle;
 
     /// An upright board: the lower left vertex of the print is `low`, with one pixel per column.
-    fn board(rows: i32, cols: i32, low: Vertex, turns: u8) -> SaddleGrid {
+    fn board(rows: i32, cols: i32, low: Vertex, rotations: u8) -> SaddleGrid {
         let vertices = (0..rows).flat_map(|r| (0..cols).map(move |c| (r, c)));
         vertices
             .map(|(r, c)| {
-                let (row, col) = match turns {
+                let (row, col) = match rotations {
                     0 => (r, c),
                     1 => (c, -r),
                     2 => (-r, -c),
@@ -132,10 +133,10 @@ mod tests {
     proptest! {
         #[test]
         fn labels_are_those_of_the_print_however_the_grid_counts(
-            rows in 2..7i32, cols in 2..7i32, row in -9..9i32, col in -9..9i32, turns in 0..4u8,
+            rows in 2..7i32, cols in 2..7i32, row in -9..9i32, col in -9..9i32, rotations in 0..4u8,
             inverted: bool,
         ) {
-            let grid = board(rows, cols, Vertex::new(row, col), turns);
+            let grid = board(rows, cols, Vertex::new(row, col), rotations);
             let size = [rows as u32, cols as u32];
             let motion = fit_rectangle(&grid, size, inverted).unwrap();
             let map = |v| motion.apply(v);

@@ -37,7 +37,7 @@ const SIGMAS: [f64; 3] = [0.02, 0.04, 0.08];
 const MAX_SIGMAS: f64 = 3.0;
 
 /// At least one in so many edges to neighbours must be visible.
-const MOST_COVERED: usize = 3;
+const MAX_COVERED: usize = 3;
 
 /// Minimum number of corners of a grid that predicts others; an initial quad has four.
 const LEAST: usize = 5;
@@ -235,8 +235,8 @@ fn belongs<const N: usize>(
     };
     let direction = |k: usize| map.along(step::<N>(k)).to_angle();
     let off = |shift: usize| {
-        let turns = (0..N).map(|k| turn(saddle.sectors.rays[k], direction(k + shift)).abs());
-        turns.fold(0.0, f64::max)
+        let rotations = (0..N).map(|k| turn(saddle.sectors.rays[k], direction(k + shift)).abs());
+        rotations.fold(0.0, f64::max)
     };
     let turn = (parity..N).step_by(2).min_by(|&a, &b| off(a).total_cmp(&off(b)))?;
     (off(turn) <= MAX_CHORD_RAD).then_some(GrownSaddle { saddle: *saddle, turn })
@@ -263,7 +263,7 @@ fn is_joined<const N: usize>(
             End::of(&other.saddle, back),
         ));
     }
-    MOST_COVERED * clean >= beside
+    MAX_COVERED * clean >= beside
 }
 
 /// Returns the contrast of the corner of a grid that is nearest to a vertex on the lattice.

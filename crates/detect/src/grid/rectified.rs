@@ -32,7 +32,7 @@ const FIT_REACH_PX: f64 = 9.0;
 
 /// Minimum ratio of the axes of a view. A smaller one shows nothing that the image does not show as well: sectors seen
 /// at 45° are still 40° wide.
-const LEAST_STRETCH: f64 = 1.5;
+const MIN_STRETCH: f64 = 1.5;
 
 /// An affine view of the surroundings of a position.
 pub(crate) struct Rectified {
@@ -75,7 +75,7 @@ impl Rectified {
     /// small.
     fn shows_more(&self, level: usize) -> bool {
         let axes = self.image_from_patch.singular_values() / f64::from(1u32 << level);
-        axes[1] < 1.0 || axes[0] > LEAST_STRETCH * axes[1]
+        axes[1] < 1.0 || axes[0] > MIN_STRETCH * axes[1]
     }
 
     /// Returns the nearest accepted corner about the position, as a level of the pyramid shows it, if the patch shows

@@ -22,7 +22,7 @@ use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::raster::ImageView;
 
 /// Number of whole squares of the smallest board, of 3 × 3 corners.
-const LEAST_SQUARES: usize = 4;
+const MIN_SQUARES: usize = 4;
 
 /// Minimum F_3, relative to F_1. The model reads a wave as a blur of a quarter of an edge. Such a blur leaves an F_3 of
 /// 0.028; a wave has none.
@@ -32,13 +32,13 @@ const WAVE: f64 = 0.02;
 const PLAIN: f64 = 1.0 / 3.0;
 
 /// Minimum F_33 of squares, relative to its ideal value, the product of F_3 along and across.
-const LEAST_PRODUCT: f64 = 0.5;
+const MIN_PRODUCT: f64 = 0.5;
 
 /// Tolerance of these limits, in standard deviations, measured by waves that tiles of boards and dots do not have.
 const DEVIATIONS: f64 = 3.0;
 
 /// Number of isolated squares of the wrong colour below which they count as dirt, for any number of whole squares.
-const LEAST_WRONG: usize = 3;
+const MIN_WRONG: usize = 3;
 
 /// The same as a fraction of the whole squares.
 const WRONG_PART: f64 = 1.0 / 16.0;
@@ -57,7 +57,7 @@ pub(crate) fn is_of_squares(image: ImageView, grid: &Grid, may_have_tags: bool) 
     }
     let tiles = CheckerTiles::of(image, grid);
     let count = tiles.whole_squares().count();
-    count >= LEAST_SQUARES
+    count >= MIN_SQUARES
         && has_few_wrong_squares(&tiles, count)
         && Waves::of(&tiles).is_none_or(|waves| waves.are_of_squares(may_have_tags))
 }
@@ -109,7 +109,7 @@ impl Waves {
     fn are_of_squares(self, may_have_tags: bool) -> bool {
         let most = self.along.max(self.across);
         let is_plain = !may_have_tags && most <= PLAIN;
-        let least = LEAST_PRODUCT * self.along * self.across - DEVIATIONS * self.noise;
+        let least = MIN_PRODUCT * self.along * self.across - DEVIATIONS * self.noise;
         most >= WAVE && !(is_plain && self.both < least)
     }
 }
@@ -128,7 +128,7 @@ fn has_few_wrong_squares(tiles: &CheckerTiles, whole: usize) -> bool {
         value.is_some_and(|value| (value - right) / (wrong - right) >= WRONG)
     };
     let wrong = places.into_iter().filter(is_wrong).count();
-    wrong < LEAST_WRONG || (wrong as f64) < WRONG_PART * whole as f64
+    wrong < MIN_WRONG || (wrong as f64) < WRONG_PART * whole as f64
 }
 
 /// Returns the square at a vertex, if none of its corners is known and some are on each of its sides.

@@ -63,7 +63,7 @@ struct TargetPanel {
 
 /// Maximum number of corners of a board. A board of 140 × 140 corners has edges of 14 px in an image of 4
 /// megapixels. Fabrics and grids on screens have more, and synthetic images so many that refinement takes minutes.
-pub(crate) const MOST_CORNERS: usize = 20_000;
+pub(crate) const MAX_CORNERS: usize = 20_000;
 
 impl Labels {
     /// Creates labels by the rows and columns of an untagged board, if they are known.
@@ -181,7 +181,7 @@ impl Labels {
     /// a fabric or a tiled floor is as regular as a board, but seldom as small.
     pub(crate) fn most_corners(&self) -> usize {
         match &self.source {
-            Source::None => MOST_CORNERS,
+            Source::None => MAX_CORNERS,
             Source::Outline(outline) => outline.len(),
             Source::Rectangle([rows, cols]) => *rows as usize * *cols as usize,
             Source::Target { panels, .. } => {

@@ -37,7 +37,7 @@ const BLUR_EDGES: usize = 150;
 const BLUR_STEP: f64 = 1.12;
 
 /// Smallest standard deviation of the blur, px. Pixels and their interpolation are never sharper.
-const LEAST_BLUR_PX: f64 = 0.35;
+const MIN_BLUR_PX: f64 = 0.35;
 
 /// Number of standard deviations that are tried. The last is 6 px, half a tile.
 const BLUR_STEPS: i32 = 26;
@@ -59,7 +59,7 @@ const CLIPPED_SHARES: [f64; 8] = [1.0, 0.85, 0.65, 0.5, 0.35, 0.25, 0.18, 0.12];
 const CLIPPING_GAIN: f64 = 1.5;
 
 /// Minimum standard deviation of a sample, of full scale: half a step of 8 bits.
-const LEAST_DEVIATION: f64 = 0.002;
+const MIN_DEVIATION: f64 = 0.002;
 
 /// Variance of the levels measured at an edge, relative to that of a sample. A few samples on either side determine
 /// them.
@@ -69,7 +69,7 @@ const EDGE_VARIANCE: f64 = 0.16;
 const SLOPE: f64 = 0.2;
 
 /// Largest curvature of a tone curve. Gamma 2.6 between white and a black of 1/20 has 0.4.
-const MOST_CURVATURE: f64 = 0.45;
+const MAX_CURVATURE: f64 = 0.45;
 
 /// Curvature below which the curve counts as straight. It changes a share of white by less than 0.0005, a quarter of
 /// the rounding to 8 bits.
@@ -166,7 +166,7 @@ impl GridLight {
             return None;
         }
         if 2 * saturated > count {
-            let least = LEAST_DEVIATION * f64::from(image.full_scale());
+            let least = MIN_DEVIATION * f64::from(image.full_scale());
             light.clipped_share = clipped_share(&by_direction, least);
         }
         let (mut curvature, mut power) = (0.0, 0.0);
@@ -194,7 +194,7 @@ impl GridLight {
         if power <= 0.0 {
             return None;
         }
-        light.tone = (curvature / power).clamp(-MOST_CURVATURE, MOST_CURVATURE);
+        light.tone = (curvature / power).clamp(-MAX_CURVATURE, MAX_CURVATURE);
         if light.clipped_share < 1.0 {
             light.tone = 0.0;
         }
@@ -403,7 +403,7 @@ fn best_width(profiles: &[&Profile], clipped_share: f64) -> (f64, f64) {
     let coarse = best_step(profiles, clipped_share, (0..BLUR_STEPS).step_by(COARSE_STEPS as usize));
     let around = (coarse.0 - COARSE_STEPS + 1).max(0)..(coarse.0 + COARSE_STEPS).min(BLUR_STEPS);
     let (step, left) = best_step(profiles, clipped_share, around);
-    (LEAST_BLUR_PX * BLUR_STEP.powi(step), left)
+    (MIN_BLUR_PX * BLUR_STEP.powi(step), left)
 }
 
 /// Returns the best of several steps of the standard deviation of the blur, and its sum of squares.
@@ -413,7 +413,7 @@ fn best_step(
     steps: impl Iterator<Item = i32>,
 ) -> (i32, f64) {
     let left = |step: i32| {
-        let sigma_px = LEAST_BLUR_PX * BLUR_STEP.powi(step);
+        let sigma_px = MIN_BLUR_PX * BLUR_STEP.powi(step);
         // If nothing of the edge is left, it cannot be fitted.
         let squares = profiles
             .iter()

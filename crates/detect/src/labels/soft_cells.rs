@@ -50,21 +50,21 @@ const NOISE_WEIGHT: f64 = 1.5;
 
 /// Largest correlation of a blur in tile coordinates: the centre of the interval rounded to 1, because no covariance
 /// has a correlation of 1.
-const MOST_CORRELATION: f64 = 0.95;
+const MAX_CORRELATION: f64 = 0.95;
 
 /// Squared distance, in σ of the blur, beyond which a part of a cell is ignored. Its weight there is e⁻⁸ of that in the
 /// centre.
 const FAR_SIGMAS2: f64 = 16.0;
 
-/// Minimum variance of a cell. With less, its odds exceed [`MOST_HALF_ODDS`] anyway.
-const LEAST_VARIANCE: f64 = 1e-3;
+/// Minimum variance of a cell. With less, its odds exceed [`MAX_HALF_ODDS`] anyway.
+const MIN_VARIANCE: f64 = 1e-3;
 
 /// Minimum standard deviation of a predicted sample, relative to the contrast: a fiftieth of [`MODEL_ERROR`].
-const LEAST_SPREAD: f32 = 1e-3;
+const MIN_SPREAD: f32 = 1e-3;
 
 /// Probability above the bound from which the truncated mean is computed. Below it, the mean is within σ/4 of the
 /// bound, and the error function is off by 1/1000 of the remaining probability.
-const LEAST_ABOVE: f32 = 1e-4;
+const MIN_ABOVE: f32 = 1e-4;
 
 /// Standard deviation of the grey levels, relative to the contrast.
 const LEVEL_ERROR: f64 = 0.15;
@@ -73,7 +73,7 @@ const LEVEL_ERROR: f64 = 0.15;
 const SLOPE_ERROR: f64 = 0.2;
 
 /// Largest half log-odds of a cell: one in two hundred is dirty on the print.
-const MOST_HALF_ODDS: f64 = 2.6;
+const MAX_HALF_ODDS: f64 = 2.6;
 
 /// Number of unknowns beside the cells: the level and its slopes along u and v.
 const LEVELS: usize = 3;
@@ -199,7 +199,7 @@ impl CellModel {
         }
         let [uu, vv] = [key[0], key[1]].map(|k| (f64::from(k) * LOG_VARIANCE_STEP).exp());
         let correlation =
-            (f64::from(key[2]) * CORRELATION_STEP).clamp(-MOST_CORRELATION, MOST_CORRELATION);
+            (f64::from(key[2]) * CORRELATION_STEP).clamp(-MAX_CORRELATION, MAX_CORRELATION);
         let covariance = [uu, correlation * (uu * vv).sqrt(), vv];
         let mixing = Rc::new(self.make(covariance, blur.area_px2, blur.noise)?);
         known.insert(key, Rc::clone(&mixing));
@@ -245,7 +245,7 @@ impl CellModel {
         let middle =
             (0..n).map(|i| (white[i] + (0..bits).map(|c| design[(i, c)]).sum::<f64>()) as f32);
         let row = |c: usize| (0..n).map(|i| gain[(c, i)] as f32).collect();
-        let inverse_variance = |c: usize| (1.0 / inverse[(c, c)].max(LEAST_VARIANCE)) as f32;
+        let inverse_variance = |c: usize| (1.0 / inverse[(c, c)].max(MIN_VARIANCE)) as f32;
         let spread =
             half_shares.iter().map(|row| row.iter().map(|w| w * w).sum::<f32>().sqrt()).collect();
         Some(Mixing {
@@ -314,7 +314,7 @@ impl Mixing {
                 means = self.means(&off_middle);
             }
         }
-        let most = MOST_HALF_ODDS as f32;
+        let most = MAX_HALF_ODDS as f32;
         let odds = means.iter().zip(&self.inverse_variance);
         odds.map(|(mean, inverse_variance)| (mean * inverse_variance).clamp(-most, most)).collect()
     }
@@ -339,10 +339,10 @@ impl Mixing {
 
 /// Returns the mean of a normal distribution truncated below at `least`.
 fn mean_above(least: f32, mean: f32, deviation: f32) -> f32 {
-    let deviation = deviation.max(LEAST_SPREAD);
+    let deviation = deviation.max(MIN_SPREAD);
     let at = (least - mean) / deviation;
     let above = 0.5 - 0.5 * erf_sqrt_half(at);
-    if above < LEAST_ABOVE {
+    if above < MIN_ABOVE {
         return least;
     }
     let density = (-0.5 * at * at).exp() / std::f32::consts::TAU.sqrt();

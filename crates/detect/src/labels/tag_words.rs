@@ -6,13 +6,13 @@ use deltille_core::family::Family;
 const FAMILY_WEIGHT: f64 = 16.0;
 
 /// Minimum distance of a frequency from 0 and 1.
-const LEAST_FREQUENCY: f64 = 0.05;
+const MIN_FREQUENCY: f64 = 0.05;
 
 /// Codes of a target in all rotations.
 #[derive(Clone, Debug)]
 pub(crate) struct TargetWords {
     ids: Vec<u32>,
-    turns: usize,
+    rotations: usize,
     /// Code i rotated k times is word i · turns + k.
     words: Vec<u64>,
     /// Frequency of white in each cell, by rotation.
@@ -23,11 +23,11 @@ impl TargetWords {
     /// Creates the words of some codes of a family.
     pub(crate) fn new(family: &Family, ids: Vec<u32>) -> Self {
         let cells = family.cells();
-        let turns = usize::from(family.kind().turns());
+        let rotations = usize::from(family.kind().rotations());
         let bits = family.dimension().bits() as usize;
         let all_turns = |code: u64| {
             let mut all = vec![code];
-            while all.len() < turns {
+            while all.len() < rotations {
                 all.push(cells.rotate(all[all.len() - 1]));
             }
             all
@@ -49,15 +49,15 @@ impl TargetWords {
             let in_family = of_family[bit] / family.codes().len().max(1) as f64;
             let frequency =
                 (of_target[bit] + FAMILY_WEIGHT * in_family) / (ids.len() as f64 + FAMILY_WEIGHT);
-            frequency.clamp(LEAST_FREQUENCY, 1.0 - LEAST_FREQUENCY) as f32
+            frequency.clamp(MIN_FREQUENCY, 1.0 - MIN_FREQUENCY) as f32
         };
         let mut frequencies = vec![(0..bits).map(frequency).collect::<Vec<f32>>()];
-        while frequencies.len() < turns {
+        while frequencies.len() < rotations {
             let last = &frequencies[frequencies.len() - 1];
             frequencies
                 .push(cells.rotation().iter().map(|&from| last[usize::from(from)]).collect());
         }
-        Self { ids, turns, words, frequencies }
+        Self { ids, rotations, words, frequencies }
     }
 
     /// Returns the number of words.
@@ -66,8 +66,8 @@ impl TargetWords {
     }
 
     /// Returns the number of rotations of a code.
-    pub(crate) fn turns(&self) -> usize {
-        self.turns
+    pub(crate) fn rotations(&self) -> usize {
+        self.rotations
     }
 
     /// Returns the index of the code with an id.
@@ -100,7 +100,7 @@ impl TargetWords {
                 .enumerate()
                 .map(|(byte, sums)| sums[(word >> (8 * byte) & 0xff) as usize])
                 .sum();
-            2.0 * white - total - unrelated[index % self.turns]
+            2.0 * white - total - unrelated[index % self.rotations]
         };
         self.words.iter().enumerate().map(evidence).collect()
     }
@@ -149,7 +149,7 @@ mod tests {
             assert!((mean - 1.0).abs() < 1e-3, "{strength}: {mean}");
             let all = words.evidence(&half_odds);
             for code in 0..words.ids.len() {
-                let index = code * words.turns();
+                let index = code * words.rotations();
                 let single = words.evidence_of(words.word(index), &half_odds);
                 assert!((all[index] - single).abs() < 1e-4, "{strength}, code {code}");
             }

@@ -31,7 +31,7 @@ const SATURATED: f64 = 0.985;
 const PLAIN_DEPTH: f64 = 0.2;
 
 /// Minimum depth, where a tag leaves no more.
-const LEAST_DEPTH: f64 = 0.06;
+const MIN_DEPTH: f64 = 0.06;
 
 /// Half the interval over which the map of a tile is differentiated, in tile coordinates. It stays inside the tile,
 /// because the centre of a triangle is at a third.
@@ -135,7 +135,7 @@ impl TagReader {
         let cells = family.cells();
         let inset_bits = margin_bits + border_bits;
         let width = cells.width(inset_bits);
-        let depth = |bits: f64| (bits / width).clamp(LEAST_DEPTH, PLAIN_DEPTH);
+        let depth = |bits: f64| (bits / width).clamp(MIN_DEPTH, PLAIN_DEPTH);
         let clear = match tags_in {
             TagsIn::Black => ClearDepth { dark: depth(border_bits), bright: PLAIN_DEPTH },
             TagsIn::White => ClearDepth { dark: PLAIN_DEPTH, bright: depth(margin_bits) },

@@ -23,10 +23,10 @@ const SATURATED: f64 = 0.985;
 const HIDING_BLUR_PX: f64 = 6.0;
 
 /// Minimum length of a readable cell on a board of tags, px, for any sharpness.
-const LEAST_BIT_PX: f64 = 1.25;
+const MIN_BIT_PX: f64 = 1.25;
 
 /// Minimum length of a readable cell, in standard deviations of the blur.
-const LEAST_BIT_BLURS: f64 = 1.0;
+const MIN_BIT_BLURS: f64 = 1.0;
 
 /// Factor by which cells must be longer to read a single tag than to read a board.
 const TAG_FOR_TAG: f64 = 2.0;
@@ -85,7 +85,7 @@ pub(crate) fn no_labels(evidence: &TagEvidence, grid: &SaddleGrid, size: [usize;
         return Reason::new(ReasonKind::NoTiles, [corners]);
     }
     let (bit_px, blur_px) = (evidence.bit_px, evidence.blur_px);
-    let needed_bit_px = LEAST_BIT_PX.max(LEAST_BIT_BLURS * blur_px);
+    let needed_bit_px = MIN_BIT_PX.max(MIN_BIT_BLURS * blur_px);
     if bit_px < needed_bit_px {
         let figures = [("bit_px", bit_px), ("blur_px", blur_px), ("needed_bit_px", needed_bit_px)];
         return Reason::new(ReasonKind::UnreadableTags, figures);

@@ -221,7 +221,7 @@ impl<const K: usize, P: Pattern<K>> Pattern<K> for Inked<P> {
 }
 
 /// Minimum length of a box to each side, in units of the blur. It widens the blur by 0.2 %.
-const LEAST_WAY: f32 = 0.1;
+const MIN_WAY: f32 = 0.1;
 
 /// Three edges in an image that moved along a line at constant speed, half of the motion on each side of the centre.
 /// The blur of an edge is then a box after a Gaussian.
@@ -236,7 +236,7 @@ pub(crate) struct SweptDeltille {
 impl SweptDeltille {
     /// Creates it from half of the motion across each edge, in units of the blur.
     pub(crate) fn new(way: [f32; 3]) -> Self {
-        let reach = way.map(|way| way.abs().max(LEAST_WAY));
+        let reach = way.map(|way| way.abs().max(MIN_WAY));
         let over_whole = reach.map(|reach| 0.5 / reach);
         Self { reach, over_whole, signs: way.map(f32::signum) }
     }

@@ -27,7 +27,7 @@ const BLUR_MARGIN_SIGMAS: f64 = 2.0;
 
 /// Maximum distance of a corner from the chord of its neighbours, relative to the distance to them. Lenses bend an edge
 /// by less than 0.3 rad from one corner to the next.
-const MOST_SAG: f64 = 0.15;
+const MAX_SAG: f64 = 0.15;
 
 /// Tiles by the id of their panel.
 type TilesOfPanels = BTreeMap<u32, BTreeSet<Tile>>;
@@ -244,7 +244,7 @@ pub(crate) fn crossing(grid: &Grid, corner: &GridCorner) -> Option<DVec2> {
         lines += 1;
     }
     let crossing = (lines > 1).then(|| normal.inverse() * right)?;
-    (here.distance(crossing) > MOST_SAG * nearest_px).then_some(crossing)
+    (here.distance(crossing) > MAX_SAG * nearest_px).then_some(crossing)
 }
 
 /// Positions of corners in the rectangle of rows and columns that they span.

@@ -49,7 +49,7 @@ const FACTORS: [f64; 2] = [0.02, 40.0];
 
 /// Minimum fraction of a pixel's noise that a fit leaves in its residual. If a fit follows a pixel more closely, its
 /// residual contains no information on its noise. Nearly all pixels leave more: from 0.01 to 0.2 no covariance changes.
-const LEAST_LEFT: f32 = 0.1;
+const MIN_LEFT: f32 = 0.1;
 
 /// Number of corners that determine correlations; the sums of ten vary by some per cent.
 pub(crate) const CORNERS: usize = 10;
@@ -174,7 +174,7 @@ fn uneven(corners: &[Part]) -> f64 {
     let (mut seen, mut white) = (0.0, 0.0);
     for corner in corners {
         for i in 0..corner.residuals.len() {
-            let rest = (1.0 - corner.diagonal[i]).max(LEAST_LEFT);
+            let rest = (1.0 - corner.diagonal[i]).max(MIN_LEFT);
             let square = f64::from(corner.residuals[i].powi(2) / rest);
             let influence: f32 = corner.on_position.iter().map(|c| c[i] * c[i]).sum();
             seen += f64::from(influence) * square / corner.noise.powi(2);

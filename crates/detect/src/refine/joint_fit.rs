@@ -8,7 +8,7 @@ use super::model::corner::{Corner, OWN};
 use super::model::fitter::CornerFitter;
 use super::model::joint::{Common, Joint};
 use super::model::window::Patch;
-use super::optics::{HALO, INK, INK_UNIT, LEAST_MOTION, Optics, PARAMS};
+use super::optics::{HALO, INK, INK_UNIT, MIN_MOTION, Optics, PARAMS};
 use super::significance::Estimate;
 use super::small_systems::solved;
 use deltille_core::damping::Damping;
@@ -17,7 +17,7 @@ use deltille_core::raster::ImageView;
 use deltille_core::statistics::median;
 
 /// Minimum strength of a halo: blur with wide tails. Below it, the tails are equivalent to a wider blur.
-const LEAST_HALO: f64 = -0.45;
+const MIN_HALO: f64 = -0.45;
 
 /// Prior standard deviations of the parameters. Gamma 2.6 has (1.6, 0, 0), and smooth steps have −0.5 at both ends.
 /// Halos of 0.5 are strong. A blur twice as wide in one direction has an astigmatism of 0.6. Ink that spreads by 2 % of
@@ -250,7 +250,7 @@ impl<const K: usize> Problem<'_, K> {
             let at = self.linearised(found.optics);
             found = self.adjusted(at, CONVERGED);
         }
-        if found.optics.stretch() > LEAST_MOTION && !found.optics.is_motion {
+        if found.optics.stretch() > MIN_MOTION && !found.optics.is_motion {
             found = self.moved(&found.optics).unwrap_or(found);
         }
         found
@@ -309,7 +309,7 @@ impl<const K: usize> Problem<'_, K> {
         }
         let mut step = damped.clone().cholesky()?.solve(&reduced.gradient);
         if let Some(at) = self.active.iter().position(|&p| p == HALO) {
-            let most = LEAST_HALO - optics.halo[0];
+            let most = MIN_HALO - optics.halo[0];
             if step[at] < most {
                 // The others follow.
                 let mut gradient = &reduced.gradient - most * damped.column(at);

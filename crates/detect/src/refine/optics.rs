@@ -20,7 +20,7 @@ pub(super) const STEP: f64 = 0.01;
 const HALO_WIDTH: f64 = 2.5;
 
 /// Minimum blur of the pattern without its halo, relative to a blur whose edges have the same slope.
-const LEAST_CORE: f64 = 0.3;
+const MIN_CORE: f64 = 0.3;
 
 /// Unit of the ink, in edges.
 pub(crate) const INK_UNIT: f64 = 0.01;
@@ -82,7 +82,7 @@ impl Default for Optics {
 }
 
 /// Minimum stretch of the blur that can be motion. Below it, motion changes the kurtosis by less than a fifth.
-pub(super) const LEAST_MOTION: f64 = 0.25;
+pub(super) const MIN_MOTION: f64 = 0.25;
 
 /// Distribution of the blur over directions: M, of trace 2, or its remainder without motion along a line.
 #[derive(Clone, Copy, Debug)]
@@ -183,7 +183,7 @@ impl Optics {
     /// without a halo.
     pub(crate) fn core(&self) -> f64 {
         let [strength, width] = self.halo;
-        (1.0 + strength * (1.0 - 1.0 / width)).max(LEAST_CORE)
+        (1.0 + strength * (1.0 - 1.0 / width)).max(MIN_CORE)
     }
 
     /// Returns the derivative of the logarithm of [`Self::core`] by the strength of the halo.

@@ -33,7 +33,7 @@ const BLUR_CORNERS: usize = 15;
 const OVERSAMPLING: usize = 4;
 
 /// Blur that is assumed before it is estimated, px: that of a good photograph.
-const USUAL_BLUR_PX: f64 = 1.0;
+const TYPICAL_BLUR_PX: f64 = 1.0;
 
 /// Largest blur as a fraction of the radius of the largest window. A larger one is estimated again on a coarser level,
 /// because the window shows little but the centre of the edges.
@@ -51,7 +51,7 @@ const MIN_RESIDUAL: f64 = 0.05;
 const UNUSUAL: f64 = 1.3;
 
 /// Maximum correlation of neighbouring residuals that is distinguished. Above it, they form one shape over the window.
-const MOST_CORRELATED: f64 = 0.9;
+const MAX_CORRELATED: f64 = 0.9;
 
 /// Blur at which sampling once per pixel loses nothing, px: the spectrum falls to 1/10 000 at the highest frequency.
 const SHARP_PX: f64 = 1.4;
@@ -153,7 +153,7 @@ impl Refiner {
         optics: &Optics,
         blur_px: Option<f64>,
     ) {
-        let sharpness = Sharpness { blur_px: blur_px.unwrap_or(USUAL_BLUR_PX), optics };
+        let sharpness = Sharpness { blur_px: blur_px.unwrap_or(TYPICAL_BLUR_PX), optics };
         let mut around = surroundings(grid, tags, 1.0);
         let mut refined = self.refine_each(image, grid, &around, sharpness);
         let displaced = self.put_back(grid, &refined);
@@ -321,14 +321,14 @@ impl Refiner {
         let around = surroundings_of(grid, tags, scale, sampled.clone()).into_iter();
         let mut places: Vec<(f64, GridCorner, Surroundings)> = sampled
             .zip(around)
-            .map(|(i, around)| (around.clear_square_px(USUAL_BLUR_PX), grid.corners[i], around))
+            .map(|(i, around)| (around.clear_square_px(TYPICAL_BLUR_PX), grid.corners[i], around))
             .collect();
         places.sort_by(|a, b| b.0.total_cmp(&a.0));
         let fits = places.iter().take(BLUR_CORNERS).filter_map(|(clear_px, corner, around)| {
             let place = Pyramid::from_level_0(level, corner.position());
             // A wave is visible in the middle of the tiles.
             let reach_px = clear_px.max(MIN_MODEL_RADIUS as f64).floor();
-            let room = Room { around, blur_px: USUAL_BLUR_PX, reach_px, optics: &self.known };
+            let room = Room { around, blur_px: TYPICAL_BLUR_PX, reach_px, optics: &self.known };
             self.model(fitter, image, place, room, None).map(|fit| scale * fit.blur_px())
         });
         median(fits.collect())
@@ -382,7 +382,7 @@ pub(crate) fn is_sampled(blurs: &[Option<f64>], part: f64) -> bool {
 /// r))² times their variance.
 fn shape_of_residuals(fit: &ModelFit, usual_noise: f64) -> f64 {
     let share = 1.0 - (UNUSUAL * usual_noise / fit.noise()).powi(2);
-    let correlation = (1.0 - fit.whiteness).clamp(0.0, MOST_CORRELATED);
+    let correlation = (1.0 - fit.whiteness).clamp(0.0, MAX_CORRELATED);
     let together = ((1.0 + correlation) / (1.0 - correlation)).powi(2);
     1.0 + share.max(0.0) * (together - 1.0)
 }

@@ -112,8 +112,8 @@ impl Optics {
             let [kappa, kappa_odd] = self.kappas(greys);
             let slopes = active.iter().map(|&p| self.kappa_slope(greys, p));
             let slopes = DVector::from_iterator(active.len(), slopes);
-            let kappa_deviation = slopes.dot(&(cov * &slopes)).max(0.0).sqrt();
-            let mut tone = ToneEstimate::new(greys, kappa, kappa_deviation);
+            let kappa_sd = slopes.dot(&(cov * &slopes)).max(0.0).sqrt();
+            let mut tone = ToneEstimate::new(greys, kappa, kappa_sd);
             (tone.kappa_odd, tone.used) = (kappa_odd, used);
             tone
         })

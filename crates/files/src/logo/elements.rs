@@ -5,10 +5,10 @@ use std::collections::HashMap;
 
 use usvg::roxmltree::{Document, Node, NodeId};
 
-use super::{LogoError, MOST_ELEMENTS};
+use super::{LogoError, MAX_ELEMENTS};
 
 /// Maximum nesting depth of elements, including `use`.
-const MOST_DEPTH: usize = 100;
+const MAX_DEPTH: usize = 100;
 
 /// Elements without an outline to fill, and the remedy for each. Many files contain unused gradients, clips and filters;
 /// `painted` refuses them where they are used.
@@ -34,8 +34,8 @@ pub(super) fn check(xml: &Document) -> Result<(), LogoError> {
     let mut counts = HashMap::new();
     let by_id = xml.descendants().filter_map(|node| Some((node.attribute("id")?, node))).collect();
     let elements = count(xml.root_element(), &by_id, &mut counts, 0)?;
-    if elements > MOST_ELEMENTS {
-        return Err(LogoError::Much { what: "elements", most: MOST_ELEMENTS });
+    if elements > MAX_ELEMENTS {
+        return Err(LogoError::Much { what: "elements", most: MAX_ELEMENTS });
     }
     Ok(())
 }
@@ -57,8 +57,8 @@ fn count<'a>(
     counts: &mut HashMap<NodeId, usize>,
     depth: usize,
 ) -> Result<usize, LogoError> {
-    if depth > MOST_DEPTH {
-        return Err(LogoError::Much { what: "levels of elements", most: MOST_DEPTH });
+    if depth > MAX_DEPTH {
+        return Err(LogoError::Much { what: "levels of elements", most: MAX_DEPTH });
     }
     if let Some(&known) = counts.get(&node.id()) {
         return Ok(known);

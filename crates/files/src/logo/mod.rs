@@ -34,7 +34,7 @@ use area::{Area, Tone};
 pub const MAX_LOGO_BYTES: usize = 500_000;
 
 /// Maximum number of elements, including those repeated by `use`: the reader takes a tenth of a second for them.
-const MOST_ELEMENTS: usize = 20_000;
+const MAX_ELEMENTS: usize = 20_000;
 
 /// Time limit for reading: a hundred times the time for the largest logo.
 const TIME: Duration = Duration::from_secs(20);

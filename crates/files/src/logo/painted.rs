@@ -14,13 +14,13 @@ use super::{LogoError, crossings};
 const FLATNESS: f64 = 1e-4;
 
 /// Maximum number of corners of all outlines before their union.
-const MOST_CORNERS: usize = 20_000;
+const MAX_CORNERS: usize = 20_000;
 
 /// Maximum number of crossing lines: their union has a corner at each crossing.
-const MOST_CROSSINGS: usize = 100_000;
+const MAX_CROSSINGS: usize = 100_000;
 
 /// Maximum number of dashes of a stroke.
-const MOST_DASHES: usize = 2_000;
+const MAX_DASHES: usize = 2_000;
 
 /// Returns the painted areas in painting order.
 pub(super) fn of(tree: &Tree) -> Result<Vec<(Tone, Area)>, LogoError> {
@@ -32,8 +32,8 @@ pub(super) fn of(tree: &Tree) -> Result<Vec<(Tone, Area)>, LogoError> {
     let mut straight = |outline: &Outline| {
         let straight = outline.straight(flatness);
         corners += straight.outlines.iter().map(Vec::len).sum::<usize>();
-        match corners > MOST_CORNERS {
-            true => Err(LogoError::Much { what: "corners", most: MOST_CORNERS }),
+        match corners > MAX_CORNERS {
+            true => Err(LogoError::Much { what: "corners", most: MAX_CORNERS }),
             false => Ok(straight),
         }
     };
@@ -42,8 +42,8 @@ pub(super) fn of(tree: &Tree) -> Result<Vec<(Tone, Area)>, LogoError> {
     let clips: Vec<Vec<Straight>> = clips.collect::<Result<_, _>>()?;
     let items = found.items.iter().map(|item| straight(&item.outline));
     let items: Vec<Straight> = items.collect::<Result<_, _>>()?;
-    if !crossings::are_at_most(MOST_CROSSINGS, clips.iter().flatten().chain(&items)) {
-        return Err(LogoError::Much { what: "crossings of outlines", most: MOST_CROSSINGS });
+    if !crossings::are_at_most(MAX_CROSSINGS, clips.iter().flatten().chain(&items)) {
+        return Err(LogoError::Much { what: "crossings of outlines", most: MAX_CROSSINGS });
     }
     let clips: Vec<Area> = clips
         .iter()
@@ -211,8 +211,8 @@ fn style(stroke: &Stroke, path: &BezPath, what: &str) -> Result<kurbo::Stroke, L
     let period: f64 = dashes.iter().sum();
     let length = path.perimeter(width.max(f64::MIN_POSITIVE));
     let count = length / period * dashes.len() as f64;
-    if count.is_nan() || count > MOST_DASHES as f64 {
-        let what = format!("{what} has more than {MOST_DASHES} dashes");
+    if count.is_nan() || count > MAX_DASHES as f64 {
+        let what = format!("{what} has more than {MAX_DASHES} dashes");
         return refused(what, "use fewer, or convert strokes to paths");
     }
     Ok(style.with_dashes(f64::from(stroke.dashoffset()), dashes))

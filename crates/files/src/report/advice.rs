@@ -162,15 +162,15 @@ enum Topic {
 impl Topic {
     fn of(diagnosis: &Diagnosis) -> Self {
         match diagnosis {
-            Diagnosis::LensEnds { camera, .. } => Self::Lens(*camera),
+            Diagnosis::NonMonotonicLens { camera, .. } => Self::Lens(*camera),
             Diagnosis::IllConditioned { camera, .. } => Self::Parameters(*camera),
-            Diagnosis::GrossErrors(_) => Self::Errors,
+            Diagnosis::CommonOutliers(_) => Self::Errors,
             Diagnosis::Remedied { .. }
             | Diagnosis::LackOfFit(_)
             | Diagnosis::PoorFit { .. }
             | Diagnosis::RollingShutter { .. }
             | Diagnosis::StretchedBoard { .. }
-            | Diagnosis::OtherMinimum { .. } => Self::Cause,
+            | Diagnosis::SecondMinimum { .. } => Self::Cause,
             _ => Self::Whole,
         }
     }
@@ -332,7 +332,7 @@ fn correlated(camera: &CameraEstimate, add: &mut impl FnMut(Weight, String)) {
         return;
     }
     let is_loose = |name: &str| camera.ill_conditioned.iter().any(|loose| loose == name);
-    let names: Vec<&str> = camera.found().collect();
+    let names: Vec<&str> = camera.estimated_parameters().collect();
     let mut pairs = Vec::new();
     for i in 0..names.len() {
         for j in 0..i {
@@ -392,7 +392,7 @@ mod tests {
     use deltille_calibrate::Matrix;
 
     use super::*;
-    use deltille_calibrate::{Estimate, LackOfFit, Model, PanelPlace, ViewEstimate};
+    use deltille_calibrate::{Estimate, LackOfFit, Model, PanelPrior, ViewEstimate};
     use deltille_core::camera::{Camera, Pose};
 
     /// The advice if no lens parameter differs significantly from zero.
@@ -422,7 +422,7 @@ mod tests {
             let camera = Camera::centred(640, 480, 500.0, Model::Radtan.lens());
             CameraEstimate::given(&format!("c{index}"), camera)
         };
-        let place = PanelPlace { target_from_panel: Pose::IDENTITY, covariance: None };
+        let place = PanelPrior { target_from_panel: Pose::IDENTITY, covariance: None };
         let mut estimate = Estimate::default();
         estimate.cameras = (0..cameras).map(camera).collect();
         estimate.panels = vec![place; panels];
@@ -434,11 +434,11 @@ mod tests {
         let estimate = estimate(2, 1);
         let other = estimate.cameras[0].camera.clone();
         let diagnoses = [
-            Diagnosis::ForeignCamera { camera: 0, rms_px: 9.0 },
-            Diagnosis::AbsurdFit { camera: 1, rms_px: 9.0 },
-            Diagnosis::ManyLeftOut { left_out: 3, all: 9 },
-            Diagnosis::Late { camera: 1, frames: 2 },
-            Diagnosis::OtherMinimum { camera: 0, other, rms_px: 0.1 },
+            Diagnosis::WrongCamera { camera: 0, rms_px: 9.0 },
+            Diagnosis::UnusableFit { camera: 1, rms_px: 9.0 },
+            Diagnosis::ManyExcluded { excluded: 3, all: 9 },
+            Diagnosis::DelayedCamera { camera: 1, frames: 2 },
+            Diagnosis::SecondMinimum { camera: 0, other, rms_px: 0.1 },
             Diagnosis::LackOfFit(LackOfFit::Lens { camera: 0, rms_px: 0.1 }),
             Diagnosis::PoorFit { camera: 1, rms_px: 2.0 },
             Diagnosis::IllConditioned {
@@ -476,7 +476,7 @@ mod tests {
         estimate.cameras[0].views = (0..12).map(view).collect();
         for (diagnosis, is_blamed) in [
             (None, true),
-            (Some(Diagnosis::AbsurdFit { camera: 0, rms_px: 9.0 }), false),
+            (Some(Diagnosis::UnusableFit { camera: 0, rms_px: 9.0 }), false),
             (Some(Diagnosis::LackOfFit(LackOfFit::Lens { camera: 0, rms_px: 9.0 })), false),
         ] {
             let diagnoses: Vec<Diagnosis> = diagnosis.into_iter().collect();

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::export::calibration::Print;
 use crate::report::pictures::sample::Sample;
-use deltille_calibrate::{CameraEstimate, Candidate, Diagnosis, Estimate, PanelPlace, Words};
+use deltille_calibrate::{CameraEstimate, Candidate, Diagnosis, Estimate, Messages, PanelPrior};
 
 /// The contents of the report of a calibration.
 #[derive(Clone, Debug)]
@@ -17,7 +17,7 @@ pub struct Report<'a> {
     /// Diagnoses of the calibration.
     pub diagnoses: &'a [Diagnosis],
     /// Poses of the panels as the target file states them.
-    pub stated: &'a [PanelPlace],
+    pub stated: &'a [PanelPrior],
     /// Measurements of the print.
     pub print: Print,
     /// Thumbnails of the views as PNG, by index of the camera and name of the view; see
@@ -55,8 +55,8 @@ impl<'a> Report<'a> {
         self.estimate.panels.len() > 1
     }
 
-    pub(super) fn words(&self) -> Words<'_> {
-        Words::new(self.estimate, self.print.scale)
+    pub(super) fn words(&self) -> Messages<'_> {
+        Messages::new(self.estimate, self.print.scale)
     }
 
     /// The camera with the given index, evaluated on the held-out views.

@@ -216,8 +216,8 @@ mod tests {
             verdict(&report, &weights.iter().map(advice).collect::<Vec<_>>())
         };
         use Weight::{Good, Hint, Warning};
-        let late = [Diagnosis::Late { camera: 1, frames: 2 }];
-        let many_out = [Diagnosis::ManyLeftOut { left_out: 3, all: 9 }];
+        let late = [Diagnosis::DelayedCamera { camera: 1, frames: 2 }];
+        let many_out = [Diagnosis::ManyExcluded { excluded: 3, all: 9 }];
         for (weights, diagnoses, class, head, why) in [
             (&[Good, Good][..], &[][..], "good", "Good", "No problems were found."),
             (&[Hint, Good], &[], "hint", "Usable", "the hint below shows"),

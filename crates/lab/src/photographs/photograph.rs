@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::camera::optics::{Light, Setting, Spot, expose};
 use super::camera::sensor::record;
 use super::camera::view::{Curl, Place, View};
-use super::scene::{MOST_TILT_DEG, Scene};
+use super::scene::{MAX_TILT_DEG, Scene};
 use super::world::background::Studio;
 use super::world::covers::Covers;
 use super::world::page::{PageCorner, PrintedPage};
@@ -24,7 +24,7 @@ use deltille::raster::Gray;
 const CLEAR_PX: f64 = 3.0;
 
 /// Fraction of its contrast below which glare makes a corner invisible.
-const LEAST_CONTRAST: f64 = 0.5;
+const MIN_CONTRAST: f64 = 0.5;
 
 /// Focal length in image widths: 53° wide.
 const FOCAL_WIDTHS: f64 = 1.0;
@@ -143,7 +143,7 @@ fn pose(page: &PrintedPage, scene: &Scene, rng: &mut ChaCha8Rng) -> View {
     let (middle_mm, board_mm) = page.board_mm();
     // Every scene draws the same random numbers.
     let (roll, towards) = (rng.random_range(0.0..TAU), rng.random_range(0.0..TAU));
-    let any_tilt = rng.random_range(0.0..MOST_TILT_DEG);
+    let any_tilt = rng.random_range(0.0..MAX_TILT_DEG);
     let offset = DVec2::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0));
     let lens = rng.random_range(LENS);
     let (bent_along, bent_up) = (rng.random_range(0.0..TAU), rng.random_bool(0.5));
@@ -219,7 +219,7 @@ fn sight(
         |reflected: f64, glare: f64| (scene.exposure * (reflected * even + glare)).clamp(0.0, 1.0);
     let contrast =
         |glare| recorded(scene.white, glare) - recorded(scene.white / scene.contrast, glare);
-    match contrast(light.glare(place)) < LEAST_CONTRAST * contrast(0.0) {
+    match contrast(light.glare(place)) < MIN_CONTRAST * contrast(0.0) {
         true => Sight::Glared,
         false => Sight::Visible,
     }

@@ -9,7 +9,7 @@ pub struct Scene {
     pub size_px: [usize; 2],
     /// Size of a tag's bit in the middle of the board, px, before foreshortening by tilt.
     pub bit_px: f64,
-    /// Angle between the sheet and the sensor, degrees; `None` for a random one up to [`MOST_TILT_DEG`].
+    /// Angle between the sheet and the sensor, degrees; `None` for a random one up to [`MAX_TILT_DEG`].
     pub tilt_deg: Option<f64>,
     /// Sag of the bent sheet over the width of the board, as a fraction of that width.
     pub curl: f64,
@@ -51,7 +51,7 @@ pub struct Scene {
 }
 
 /// Largest tilt if none is given, degrees.
-pub const MOST_TILT_DEG: f64 = 50.0;
+pub const MAX_TILT_DEG: f64 = 50.0;
 
 /// Standard deviation of the blur that sharpening undoes, px.
 pub const SHARPENING_PX: f64 = 1.2;

@@ -169,7 +169,7 @@ pub(super) fn tag_word(
 /// Converts points from tile coordinates to a polygon in the frame of the panel, mm.
 fn in_tile(panel: &Panel, tile: Tile, outline: impl IntoIterator<Item = DVec2>) -> BezPath {
     polygon(outline.into_iter().map(|at| {
-        let place = panel.place_in_tile(tile, at) * panel.edge_mm;
+        let place = panel.position_in_tile(tile, at) * panel.edge_mm;
         Point::new(place.x, place.y)
     }))
 }

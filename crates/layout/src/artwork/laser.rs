@@ -247,7 +247,7 @@ fn tag_outlines(
         }
         dark.push(border);
     }
-    let place = |at: &DVec2| panel.place_in_tile(tile, *at) * panel.edge_mm;
+    let place = |at: &DVec2| panel.position_in_tile(tile, *at) * panel.edge_mm;
     Ok(dark.iter().map(|outline| outline.iter().map(place).collect()).collect())
 }
 

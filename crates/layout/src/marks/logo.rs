@@ -20,10 +20,10 @@ const UNITS: i32 = 10_000;
 
 /// Maximum length of the outline data, bytes: some 6,000 corners, more than a printer resolves on a few square
 /// centimetres. Every target file contains the outline.
-pub const MOST_LOGO_BYTES: usize = 65_536;
+pub const MAX_LOGO_BYTES: usize = 65_536;
 
 /// Maximum ratio of width to height, and of height to width.
-const MOST_RATIO: f64 = 30.0;
+const MAX_RATIO: f64 = 30.0;
 
 /// Minimum width of an outline, mm; narrower ones are omitted. Some viewers draw a mark this thin one pixel wide,
 /// others not at all.
@@ -63,10 +63,10 @@ impl Logo {
         if !(size.x > 0.0 && size.y > 0.0 && size.is_finite()) {
             return refused("the logo has no black area");
         }
-        if size.x > MOST_RATIO * size.y || size.y > MOST_RATIO * size.x {
+        if size.x > MAX_RATIO * size.y || size.y > MAX_RATIO * size.x {
             let [x, y] = [size.x, size.y].map(|side| side / size.min_element());
             return refused(format!(
-                "the aspect ratio is {x:.0} to {y:.0}: use a logo whose longer side is at most {MOST_RATIO} times \
+                "the aspect ratio is {x:.0} to {y:.0}: use a logo whose longer side is at most {MAX_RATIO} times \
                  the shorter"
             ));
         }
@@ -85,7 +85,7 @@ impl Logo {
         };
         let rings: Vec<_> = outlines.iter().map(ring).filter(|ring| ring.len() > 2).collect();
         let logo = Self::new(rings).or_else(refused)?;
-        if logo.to_string().len() > MOST_LOGO_BYTES {
+        if logo.to_string().len() > MAX_LOGO_BYTES {
             return refused(format!(
                 "the outline has {} corners, but a target file holds about 6,000: simplify its paths",
                 logo.rings.iter().map(Vec::len).sum::<usize>()
@@ -108,8 +108,8 @@ impl Logo {
         }
         let ratio = f64::from(right) / f64::from(UNITS);
         // Coordinates are rounded, so the ratio may exceed the limit slightly.
-        if !(0.99 / MOST_RATIO..=1.01 * MOST_RATIO).contains(&ratio) {
-            return Err(format!("its longer side is more than {MOST_RATIO} times the shorter"));
+        if !(0.99 / MAX_RATIO..=1.01 * MAX_RATIO).contains(&ratio) {
+            return Err(format!("its longer side is more than {MAX_RATIO} times the shorter"));
         }
         Ok(Self { rings, width: right })
     }
@@ -165,8 +165,8 @@ impl TryFrom<String> for Logo {
     type Error = String;
 
     fn try_from(text: String) -> Result<Self, String> {
-        if text.len() > MOST_LOGO_BYTES {
-            return Err(format!("it is longer than {MOST_LOGO_BYTES} characters"));
+        if text.len() > MAX_LOGO_BYTES {
+            return Err(format!("it is longer than {MAX_LOGO_BYTES} characters"));
         }
         let path = BezPath::from_svg(&text).map_err(|_| "it is not valid SVG path data")?;
         let whole = |Point { x, y }: Point| {
@@ -195,7 +195,7 @@ impl TryFrom<String> for Logo {
 #[serde(deny_unknown_fields)]
 pub struct LogoPlacement {
     /// Lower-left corner on the page, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
+    #[serde(deserialize_with = "quantity::position_mm::de")]
     pub at_mm: DVec2,
     /// Counter-clockwise rotation about that corner, radians.
     #[serde(deserialize_with = "quantity::angle_rad::de")]

@@ -9,10 +9,10 @@ use deltille_core::targets::{TargetError, format_mm};
 
 /// Largest fraction of the length of a strip that a logo may take: the check bar beside it must stay long enough to
 /// measure.
-const MOST_PART: f64 = 0.3;
+const MAX_PART: f64 = 0.3;
 
 /// Fraction of the strip that a logo may take even if the label needs the space.
-const LEAST_PART: f64 = 0.15;
+const MIN_PART: f64 = 0.15;
 
 /// Gap between a logo and its neighbours, mm.
 const BESIDE_MM: f64 = 2.0;
@@ -48,11 +48,11 @@ impl LogoSize {
     /// requested height is used up to `most`. Otherwise the logo is as high as the strip is `deep`, or smaller to leave
     /// room for the words.
     pub(crate) fn in_strip(self, [length, words]: [f64; 2], deep: f64, most: f64) -> DVec2 {
-        let widest = MOST_PART * length;
+        let widest = MAX_PART * length;
         let height = match self.height_mm {
             Some(asked) => asked.min(most).min(widest / self.width),
             None => {
-                let left = (length - Self::taken(words)).clamp(LEAST_PART * length, widest);
+                let left = (length - Self::taken(words)).clamp(MIN_PART * length, widest);
                 deep.min(left / self.width)
             }
         };

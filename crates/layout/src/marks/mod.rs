@@ -9,4 +9,4 @@ pub(crate) mod logo_room;
 pub(crate) mod tag_ids;
 
 pub use label::Label;
-pub use logo::{Logo, LogoPlacement, MOST_LOGO_BYTES};
+pub use logo::{Logo, LogoPlacement, MAX_LOGO_BYTES};

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use glam::DVec2;
 
 use crate::{Label, Placement, SheetLayout, SheetText};
-use deltille_core::family::places;
+use deltille_core::family::positions;
 use deltille_core::lattice::{GridKind, Tile, Vertex};
 use deltille_core::setting::Setting::PaperTagIds;
 use deltille_core::targets::format_mm;
@@ -18,7 +18,7 @@ const CAP: (f64, f64) = (0.09, 1.8);
 const DIGIT_CAPS: f64 = 0.85;
 
 /// Smallest capital height that is legible on paper, mm.
-const LEAST_CAP_MM: f64 = 0.7;
+const MIN_CAP_MM: f64 = 0.7;
 
 /// Adds the ids to all sheets of a target.
 pub(crate) fn add(target: &Target, sheets: &mut [SheetLayout]) -> Result<(), TargetError> {
@@ -28,7 +28,7 @@ pub(crate) fn add(target: &Target, sheets: &mut [SheetLayout]) -> Result<(), Tar
             "the target has no tags whose ids could be printed: omit this setting".to_owned(),
         );
     }
-    if target.family.as_ref().is_some_and(|family| family.name == places::NAME) {
+    if target.family.as_ref().is_some_and(|family| family.name == positions::NAME) {
         return refused("position codes have no ids to print: omit this setting".to_owned());
     }
     for panel in &target.panels {
@@ -38,8 +38,8 @@ pub(crate) fn add(target: &Target, sheets: &mut [SheetLayout]) -> Result<(), Tar
                     .to_owned(),
             );
         }
-        if CAP.0 * panel.edge_mm < LEAST_CAP_MM {
-            let least = (10.0 * LEAST_CAP_MM / CAP.0).ceil() / 10.0;
+        if CAP.0 * panel.edge_mm < MIN_CAP_MM {
+            let least = (10.0 * MIN_CAP_MM / CAP.0).ceil() / 10.0;
             let edge = format_mm(panel.edge_mm);
             return refused(format!(
                 "ids would be illegible on tiles of {edge}: use tiles of at least {least} mm"

@@ -31,7 +31,7 @@ use deltille_core::targets::{BoardSpec, Panel, TargetError};
 /// Capital height of a board's id, mm: legible from three metres. The second value is the smallest height that is
 /// printed.
 const LARGE_CAP_MM: f64 = 8.0;
-const LEAST_LARGE_CAP_MM: f64 = 4.0;
+const MIN_LARGE_CAP_MM: f64 = 4.0;
 /// Gaps between a bar, its text and the label, mm. The first value that leaves room for the board is used. The second
 /// is what 10 × 11 corners with 20 mm edges leave on A4.
 const GAPS_MM: [f64; 2] = [1.5, 0.8];
@@ -43,9 +43,9 @@ const CROP_MM: [f64; 2] = [1.0, 5.0];
 const CROP_WIDTH_MM: f64 = 0.15;
 /// Smallest blank strip along the edges of the paper, mm, even with a smaller margin. A pixel at 200 dpi is 0.13 mm,
 /// and the stroke of a bar that touches the edge can be neither measured nor trimmed.
-pub(crate) const LEAST_MARGIN_MM: f64 = 0.5;
+pub(crate) const MIN_MARGIN_MM: f64 = 0.5;
 /// Smallest edge length proposed to make a board fit, mm: the limit that office printers resolve in a tag.
-const LEAST_PROPOSED_MM: u32 = 5;
+const MIN_PROPOSED_MM: u32 = 5;
 
 /// Bounding rectangle of a panel's ink, and the blank space it needs, mm.
 pub(crate) struct Footprint {
@@ -117,7 +117,7 @@ pub(crate) fn does_not_fit(
             (Some(size), Orientation::Landscape) => format!("{size} landscape"),
         },
         packed: paper.packed,
-        fitting_edge_mm: (LEAST_PROPOSED_MM..=spec.edge_mm.ceil() as u32)
+        fitting_edge_mm: (MIN_PROPOSED_MM..=spec.edge_mm.ceil() as u32)
             .rev()
             .find(|&mm| fits(&BoardSpec { edge_mm: f64::from(mm), ..spec.clone() })),
     }
@@ -128,8 +128,8 @@ pub(crate) fn fit(
     footprint: &Footprint,
     paper: &PaperSpec,
 ) -> Result<Option<Arrangement>, TargetError> {
-    let turns: &[bool] = if footprint.is_centred { &[false] } else { &[false, true] };
-    fit_turned(footprint, paper, turns)
+    let rotations: &[bool] = if footprint.is_centred { &[false] } else { &[false, true] };
+    fit_turned(footprint, paper, rotations)
 }
 
 /// Fits a footprint on paper without rotation; `None` if it does not fit.
@@ -143,11 +143,11 @@ pub(crate) fn fit_upright(
 fn fit_turned(
     footprint: &Footprint,
     paper: &PaperSpec,
-    turns: &[bool],
+    rotations: &[bool],
 ) -> Result<Option<Arrangement>, TargetError> {
     let margin = check_margin(paper)?;
     let sizes = paper.sizes();
-    let fitting = |size| on_size(footprint, size, paper.orientation, margin, turns);
+    let fitting = |size| on_size(footprint, size, paper.orientation, margin, rotations);
     let found: Option<Arrangement> = sizes.iter().find_map(fitting);
     Ok(found.map(|arrangement| arrangement.with_logo(paper)))
 }
@@ -159,7 +159,7 @@ pub(crate) fn check_margin(paper: &PaperSpec) -> Result<f64, TargetError> {
         let problem = format!("{} is not between 0 mm and 100 mm", format_mm(margin));
         return Err(TargetError::invalid(PaperMarginMm, problem));
     }
-    Ok(margin.max(LEAST_MARGIN_MM))
+    Ok(margin.max(MIN_MARGIN_MM))
 }
 
 /// Fits a board on one size of paper.
@@ -168,7 +168,7 @@ fn on_size(
     size: &PaperSize,
     orientation: Orientation,
     margin: f64,
-    turns: &[bool],
+    rotations: &[bool],
 ) -> Option<Arrangement> {
     let (portrait, landscape) = (size.portrait_mm(), size.landscape_mm());
     let pages = match orientation {
@@ -177,7 +177,7 @@ fn on_size(
         Orientation::Auto if footprint.width < footprint.height => vec![portrait, landscape],
         Orientation::Auto => vec![landscape, portrait],
     };
-    turns
+    rotations
         .iter()
         .find_map(|&turned| pages.iter().find_map(|&page| on_page(footprint, page, margin, turned)))
 }
@@ -295,7 +295,7 @@ impl Arrangement {
         let caps_wide = ADVANCE_CAPS * text.len() as f64;
         let cap_in = |room: f64, caps: f64| {
             let cap = (room / caps).min(LARGE_CAP_MM);
-            (cap >= LEAST_LARGE_CAP_MM).then_some(cap)
+            (cap >= MIN_LARGE_CAP_MM).then_some(cap)
         };
         let end = DVec2::new(ink[0], ink[1]) - blank;
         let beside = cap_in(end.x - clear.x, caps_wide)
@@ -467,7 +467,7 @@ mod tests {
             };
             let sheet = &target.sheets[0];
             let [left, lower, right, upper] = ink(&target);
-            let margin = margin.max(LEAST_MARGIN_MM);
+            let margin = margin.max(MIN_MARGIN_MM);
             let edge_blank = if inverted { margin } else { margin.max(target.target.panels[0].quiet_zone_mm()) };
             let mark_blank = if inverted { FIELD_GAP_MM } else { target.target.panels[0].quiet_zone_mm() };
             let slack = 1e-9;

@@ -125,7 +125,7 @@ fn arrange(
     if let Some(arrangement) = fit(&footprint(0.0), paper)? {
         return Ok(arrangement);
     }
-    let least = SolidSpec::LEAST_EDGE_MM as u32;
+    let least = SolidSpec::MIN_EDGE_MM as u32;
     let mut fitting = None;
     for mm in (least..spec.edge_mm.ceil() as u32).rev() {
         if fit(&footprint(1.0 - f64::from(mm) / spec.edge_mm), paper)?.is_some() {
@@ -224,8 +224,8 @@ fn inner_number(
 /// Returns a number for standalone use, with a trailing point if it reads as another number upside down.
 pub fn upright_number(number: usize) -> String {
     let text = number.to_string();
-    let turns = text.chars().all(|c| "01689".contains(c)) && text.contains(['6', '9']);
-    if turns { text + "." } else { text }
+    let rotations = text.chars().all(|c| "01689".contains(c)) && text.contains(['6', '9']);
+    if rotations { text + "." } else { text }
 }
 
 /// Lays out a text along the middle of an edge, with its baseline `inwards` from the edge.

@@ -31,7 +31,7 @@ const LABEL_GAP_MM: f64 = 1.5;
 /// Gap above and below a logo beside that label, mm.
 const LOGO_GAP_MM: f64 = 0.75;
 /// Smallest legible capital height of a note, mm.
-const LEAST_CAP_MM: f64 = 0.9;
+const MIN_CAP_MM: f64 = 0.9;
 /// Gap between a quiet zone and the cutting line, mm.
 const CUT_GAP_MM: f64 = 0.5;
 /// Width of cutting lines, mm.
@@ -96,7 +96,7 @@ impl Cell {
     /// Rejects a note that would be illegible.
     fn check_note(&self, note: Option<&str>) -> Result<(), TargetError> {
         let Some(note) = note else { return Ok(()) };
-        let most = (self.line_mm() / (LEAST_CAP_MM * ADVANCE_CAPS)).floor() as usize;
+        let most = (self.line_mm() / (MIN_CAP_MM * ADVANCE_CAPS)).floor() as usize;
         let count = note.chars().count();
         if count <= most {
             return Ok(());

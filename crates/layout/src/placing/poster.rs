@@ -34,13 +34,13 @@ const BLANK_MM: f64 = 1.5;
 const WORDS_MM: f64 = 13.0;
 
 /// Smallest window, mm: a smaller one would consist mostly of overlap.
-const LEAST_WINDOW_MM: f64 = 40.0;
+const MIN_WINDOW_MM: f64 = 40.0;
 
 /// Maximum number of pages of a sheet or a net: an afternoon's work.
-pub(crate) const MOST_PAGES: usize = 120;
+pub(crate) const MAX_PAGES: usize = 120;
 
 /// Largest sheet, mm²: images of it that still resolve its hairlines can be verified.
-const MOST_AREA_MM2: f64 = 4e6;
+const MAX_AREA_MM2: f64 = 4e6;
 
 /// Length of an arm of a cross, and the gap around it, mm: a cross fits in a slanted margin of 5 mm.
 const CROSS_MM: (f64, f64) = (1.3, 0.35);
@@ -86,8 +86,8 @@ impl Poster {
         for orientation in orientations {
             let paper = PaperSpec { size: Some(size.clone()), orientation, ..paper.clone() };
             let least = Footprint {
-                width: LEAST_WINDOW_MM,
-                height: LEAST_WINDOW_MM + WORDS_MM,
+                width: MIN_WINDOW_MM,
+                height: MIN_WINDOW_MM + WORDS_MM,
                 edge_blank: paper.margin_mm,
                 mark_blank: 2.0 * BLANK_MM,
                 is_centred: false,
@@ -147,7 +147,7 @@ impl Poster {
         paper: &PaperSpec,
     ) -> Result<(), TargetError> {
         let area = self.size_mm().element_product();
-        let excess = (area / MOST_AREA_MM2).max(self.windows() as f64 / MOST_PAGES as f64);
+        let excess = (area / MAX_AREA_MM2).max(self.windows() as f64 / MAX_PAGES as f64);
         if excess <= 1.0 {
             return Ok(());
         }

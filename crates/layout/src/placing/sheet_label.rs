@@ -1,6 +1,6 @@
 //! The label of a sheet, with everything needed to reproduce it.
 
-use deltille_core::family::places;
+use deltille_core::family::positions;
 use deltille_core::lattice::GridKind;
 use deltille_core::targets::format_mm;
 use deltille_core::targets::{BoardSpec, FamilyRef, Fingerprint, Panel, TagsIn};
@@ -66,7 +66,7 @@ fn size_in_words(name: &str, spec: &BoardSpec) -> Vec<String> {
 /// family alone.
 pub fn tag_range(family: &str, first: u32, last: u32) -> String {
     match (family, first == last) {
-        (places::NAME, _) => family.to_owned(),
+        (positions::NAME, _) => family.to_owned(),
         (_, true) => format!("{family} id {first}"),
         (_, false) => format!("{family} ids {first}–{last}"),
     }

@@ -14,7 +14,7 @@ use deltille_core::targets::{
 };
 
 /// Smallest size proposed to make a target fit, mm: the limit that office printers resolve.
-const LEAST_PROPOSED_MM: u32 = 5;
+const MIN_PROPOSED_MM: u32 = 5;
 
 /// A panel whose size is determined by one length.
 struct SinglePanel<'a> {
@@ -49,7 +49,7 @@ impl SinglePanel<'_> {
         let fits = |mm: &u32| {
             fit(&self.footprint(f64::from(*mm), paper), paper).is_ok_and(|found| found.is_some())
         };
-        let smaller = match (LEAST_PROPOSED_MM..self.size_mm.ceil() as u32).rev().find(fits) {
+        let smaller = match (MIN_PROPOSED_MM..self.size_mm.ceil() as u32).rev().find(fits) {
             Some(mm) => format!("{} of at most {mm} mm", self.setting),
             None => format!("a smaller {PaperMarginMm}"),
         };

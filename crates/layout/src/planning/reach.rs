@@ -14,7 +14,7 @@ pub(super) const COMFORTABLE_EDGE_PX: f64 = 1.25 * MIN_UNTAGGED_EDGE_PX;
 
 /// Size of a tag cell from which boards are labelled in sharp images, px: half of the views are labelled at 1.25,
 /// nearly all at 5 % more. Tilted cells need the same area.
-const LEAST_BIT_PX: f64 = 1.3;
+const MIN_BIT_PX: f64 = 1.3;
 
 /// Number of bits that sets the penalty for boards with few tags. Boards with two tags, of 32 and 50 bits in total,
 /// need 40 % and 10 % more pixels.
@@ -115,7 +115,7 @@ impl Reach {
         let needed_px = match self.bits {
             0 => COMFORTABLE_EDGE_PX,
             // With few bits, each must be read more reliably.
-            bits => LEAST_BIT_PX * (1.0 + (FEW_BITS / f64::from(bits)).powi(3)),
+            bits => MIN_BIT_PX * (1.0 + (FEW_BITS / f64::from(bits)).powi(3)),
         };
         focal_px * self.detail_mm * shortening(self.tags > 0, tilt_rad) / needed_px
     }

@@ -93,7 +93,7 @@ mod tests {
         for (errors, dimension, distance) in table.into_iter().chain([(10, 18, 22), (11, 16, 24)]) {
             let (code, space) = (extended(errors), space());
             assert_eq!(code.dimension(), dimension);
-            assert!(code.rows().iter().all(|&row| code.contains(space.turn(row))));
+            assert!(code.rows().iter().all(|&row| code.contains(space.rotate(row))));
             let weights = weights(&code, 64).unwrap();
             let lightest = weights.iter().skip(1).position(|&words| words > 0).unwrap() + 1;
             assert_eq!(lightest, distance, "{errors} errors");
@@ -109,7 +109,7 @@ mod tests {
         assert_eq!(ranked.len(), 22_906_490_880);
         for rank in [0, 1, 4095, 5_592_405, 12_345_678_901, ranked.len() - 1] {
             let word = ranked.word(rank).unwrap();
-            assert!(code.contains(word) && space.turn(word) != word);
+            assert!(code.contains(word) && space.rotate(word) != word);
         }
         assert_eq!(ranked.word(ranked.len()), None);
     }

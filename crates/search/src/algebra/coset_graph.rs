@@ -62,7 +62,7 @@ impl CosetGraph {
             return None;
         }
         let turned: Vec<u32> =
-            free_bits.iter().map(|&i| syndromes.apply(space.turn(1 << i))).collect();
+            free_bits.iter().map(|&i| syndromes.apply(space.rotate(1 << i))).collect();
         let turned = LinearMap::of_columns(&turned);
         let mut graph = Self { space, code, free_bits, marked, turned, vertices: Vec::new() };
         graph.vertices = graph.find_vertices();
@@ -76,16 +76,16 @@ impl CosetGraph {
 
     fn find_vertices(&self) -> Vec<Vertex> {
         let words = 1u32 << self.code.dimension();
-        let fixed_words = self.code.words().filter(|&w| self.space.turn(w) == w).count() as u32;
+        let fixed_words = self.code.words().filter(|&w| self.space.rotate(w) == w).count() as u32;
         let fixed_weight = (words - fixed_words) / 3;
         (1..1u32 << self.free_bits.len())
             .filter(|&s| !self.is_marked(s))
             .filter_map(|syndrome| {
-                let once = self.turn(syndrome);
+                let once = self.rotate(syndrome);
                 if once == syndrome {
                     return Some(Vertex { syndrome, weight: fixed_weight });
                 }
-                let twice = self.turn(once);
+                let twice = self.rotate(once);
                 let first = syndrome < once && syndrome < twice;
                 (first && !self.is_marked(syndrome ^ once))
                     .then_some(Vertex { syndrome, weight: words })
@@ -97,13 +97,15 @@ impl CosetGraph {
         self.marked[syndrome as usize / 64] >> (syndrome % 64) & 1 == 1
     }
 
-    fn turn(&self, syndrome: u32) -> u32 {
+    fn rotate(&self, syndrome: u32) -> u32 {
         self.turned.apply(syndrome.into())
     }
 
     fn adjacent(&self, a: u32, b: u32) -> bool {
-        let once = self.turn(b);
-        !self.is_marked(a ^ b) && !self.is_marked(a ^ once) && !self.is_marked(a ^ self.turn(once))
+        let once = self.rotate(b);
+        !self.is_marked(a ^ b)
+            && !self.is_marked(a ^ once)
+            && !self.is_marked(a ^ self.rotate(once))
     }
 
     /// Returns a large union, grown from one random start. Vertices are added one by one, each time the one of a few
@@ -155,10 +157,10 @@ impl CosetGraph {
     fn union(&self, chosen: &[Vertex]) -> CosetUnion {
         let mut syndromes = vec![0];
         for vertex in chosen {
-            let once = self.turn(vertex.syndrome);
+            let once = self.rotate(vertex.syndrome);
             syndromes.push(vertex.syndrome);
             if once != vertex.syndrome {
-                syndromes.extend([once, self.turn(once)]);
+                syndromes.extend([once, self.rotate(once)]);
             }
         }
         let cosets = syndromes.iter().map(|&s| self.word(s)).collect();

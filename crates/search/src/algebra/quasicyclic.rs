@@ -47,8 +47,8 @@ impl Symmetry {
         let mut orbit = Vec::with_capacity(3 * self.block as usize);
         let mut image = word;
         for _ in 0..self.block {
-            let once = space.turn(image);
-            orbit.extend([image, once, space.turn(once)]);
+            let once = space.rotate(image);
+            orbit.extend([image, once, space.rotate(once)]);
             image = self.apply(space, image);
         }
         orbit
@@ -96,11 +96,11 @@ pub fn random_code(
     random: &mut impl Rng,
 ) -> Span {
     /// Largest number of dimensions added at once; larger subspaces rarely keep the distance.
-    const LARGEST_STEP: u32 = 8;
+    const MAX_STEP: u32 = 8;
     let mut code = Span::default();
     let mut failures = 0;
     while failures < patience && code.dimension() < max_dimension {
-        let most = LARGEST_STEP.min(max_dimension - code.dimension());
+        let most = MAX_STEP.min(max_dimension - code.dimension());
         let module = symmetry.small_module(space, most, random);
         let mut larger = code.clone();
         let fresh: Vec<u64> = module.into_iter().filter(|&w| larger.insert(w)).collect();

@@ -86,7 +86,7 @@ mod tests {
         for q in [17, 23, 41] {
             let (code, space) = (extended(q), space(q));
             assert_eq!(code.dimension(), q.div_ceil(2));
-            assert!(code.rows().iter().all(|&row| code.contains(space.turn(row))));
+            assert!(code.rows().iter().all(|&row| code.contains(space.rotate(row))));
             let lightest = code.words().skip(1).map(u64::count_ones).min().unwrap();
             assert_eq!(lightest, min_distance(q), "q = {q}");
         }
@@ -98,7 +98,7 @@ mod tests {
         let code = shortened(&extended(41), space(41), &keep);
         let short = CycleSpace { cycles: 12, centre: false };
         assert_eq!(code.dimension(), 15);
-        assert!(code.rows().iter().all(|&row| code.contains(short.turn(row))));
+        assert!(code.rows().iter().all(|&row| code.contains(short.rotate(row))));
         assert!(code.words().skip(1).all(|word| word.count_ones() >= 10));
     }
 }

@@ -142,7 +142,7 @@ impl Best {
         let free = self.rules.free.map_or(0, |_| bch::space().mask() ^ self.space().mask());
         let codes = (least..).map(|errors| (errors, bch::extended(errors).vanishing_on(free)));
         let (errors, code) = codes.into_iter().find(|(_, code)| code.dimension() <= most)?;
-        let is_moved = code.rows().iter().any(|&row| bch::space().turn(row) != row);
+        let is_moved = code.rows().iter().any(|&row| bch::space().rotate(row) != row);
         let source = format!(
             "extended BCH code of length 64, distance {}{}",
             2 * errors + 2,
@@ -189,12 +189,12 @@ impl Best {
         let symmetries = Symmetry::all(space);
         let drawn = symmetries[random.random_range(0..symmetries.len())];
         /// Largest number of dimensions: beyond it, even the list of words of a linear code is long.
-        const MOST_DIMENSIONS: u32 = 20;
+        const MAX_DIMENSIONS: u32 = 20;
         let bits = space.bits();
         // Small codes leave room for many cosets, as long as syndromes can be tabulated.
         let least = bits.saturating_sub(SYNDROME_BITS).max(1);
         let most = if random.random_bool(0.5) || bits > 25 {
-            MOST_DIMENSIONS
+            MAX_DIMENSIONS
         } else {
             least + random.random_range(2..=6)
         };

@@ -42,7 +42,7 @@ const SLACK_MM: f64 = 1e-5;
 const RELATIVE_SLACK: f64 = 1e-6;
 
 /// Largest fraction of a pixel that both bodies, or neither, may cover: a thousandth of a millimetre along its side.
-const MOST_BESIDE: f32 = 0.01;
+const MAX_BESIDE: f32 = 0.01;
 
 type Triangle = [DVec3; 3];
 
@@ -282,7 +282,7 @@ fn surface(
     let dark = || black.iter().map(|corners| (corners.as_slice(), 1.0));
     let both = white.iter().map(|corners| (corners.as_slice(), 1.0)).chain(dark());
     let beside = picture.covered(both.chain([(face.outline.as_slice(), -1.0)]));
-    let worst = beside.pixels().iter().position(|part| part.abs() > MOST_BESIDE);
+    let worst = beside.pixels().iter().position(|part| part.abs() > MAX_BESIDE);
     let problem = worst.map(|index| {
         let [x, y] = picture.place(index).to_array();
         let id = face.panel.id;

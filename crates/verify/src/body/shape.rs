@@ -52,7 +52,7 @@ const BESIDE_MM: f64 = 0.02;
 const SAME_MIDDLE: usize = 4;
 
 /// Positions along a side of a face, as fractions of its length, at which rays are sent.
-const PLACES: [f64; 3] = [0.15, 0.5, 0.85];
+const POSITIONS: [f64; 3] = [0.15, 0.5, 0.85];
 
 /// Reads an STL, and compares it with the target.
 ///
@@ -228,7 +228,7 @@ fn check_seats(
             for (inset, stated) in felt {
                 let outline = circle.inset(&corners, inset, -ABOVE_MM);
                 let sides = outline.iter().zip(outline.iter().cycle().skip(1));
-                for at in sides.flat_map(|(from, to)| PLACES.map(|part| from.lerp(*to, part))) {
+                for at in sides.flat_map(|(from, to)| POSITIONS.map(|part| from.lerp(*to, part))) {
                     let found = depth(facets, at, -circle.normal) - ABOVE_MM;
                     let off = match stated {
                         Some(stated) => (found - stated).abs(),

@@ -4,7 +4,7 @@ use crate::finding::any::{Finding, PageFinding};
 use crate::finding::construct::ConstructFinding;
 
 /// Maximum number of findings listed for a file.
-const MOST_LISTED: usize = 64;
+const MAX_LISTED: usize = 64;
 
 /// Constructs that are not allowed, collected while a file is inspected.
 #[derive(Default)]
@@ -58,7 +58,7 @@ impl Findings {
 
     /// Whether the list of findings is full; further findings are dropped.
     pub(super) fn is_full(&self) -> bool {
-        self.0.len() >= MOST_LISTED
+        self.0.len() >= MAX_LISTED
     }
 
     /// Adds the findings of a file that belongs to this one, such as a texture, with its name before the locations.

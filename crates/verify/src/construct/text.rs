@@ -1,7 +1,7 @@
 //! Words, numbers and names in a text, as all readers interpret them.
 
 /// Maximum number of characters of a number: readers accept different lengths.
-const MOST_DIGITS: usize = 40;
+const MAX_DIGITS: usize = 40;
 
 /// Returns the content of a text file.
 pub(super) fn text(bytes: &[u8]) -> Result<&str, String> {
@@ -19,7 +19,7 @@ pub(super) fn decimal(word: &str) -> Option<f64> {
     let digits = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
     let size = word.strip_prefix('-').unwrap_or(word);
     let (whole, fraction) = size.split_once('.').unwrap_or((size, "0"));
-    let plain = word.len() <= MOST_DIGITS && digits(whole) && digits(fraction);
+    let plain = word.len() <= MAX_DIGITS && digits(whole) && digits(fraction);
     plain.then(|| word.parse().ok()).flatten()
 }
 

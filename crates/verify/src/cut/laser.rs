@@ -36,7 +36,7 @@ use deltille_layout::artwork::{CutDrawing, CutLayer, CuttingError, LaserBoard};
 const KERF_STEP_MM: f64 = 1e-4;
 
 /// Largest difference between the ink of a pixel as sampled by resvg and its coverage, including a hairline.
-const MOST_INK: f64 = 0.25;
+const MAX_INK: f64 = 0.25;
 
 /// Whether a file name is that of a drawing for a laser.
 pub(crate) fn is_named(target: &Target, path: &Path) -> bool {
@@ -173,7 +173,7 @@ fn differs_when_rendered(
     }
     let stated = cover.finish();
     let shown = page.image.pixels().iter().map(|&pixel| 1.0 - f64::from(pixel) / 255.0);
-    let differs = |(stated, shown): (&f32, f64)| (f64::from(stated.abs()) - shown).abs() > MOST_INK;
+    let differs = |(stated, shown): (&f32, f64)| (f64::from(stated.abs()) - shown).abs() > MAX_INK;
     let first = stated.pixels().iter().zip(shown).position(differs);
     Ok(first.map_or_else(Vec::new, |index| {
         let width = page.image.width();

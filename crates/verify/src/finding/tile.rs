@@ -61,7 +61,7 @@ pub enum TileFinding {
         /// The id that is read.
         reads: u32,
         /// Counter-clockwise rotation, in steps of 120°.
-        turns: u8,
+        rotations: u8,
     },
     /// A tag has too many wrong cells for correction.
     #[error("tag {id} at row {row} col {col} is unreadable: {} bits differ", bits.len())]

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use crate::finding::any::Finding;
 use crate::finding::board::BoardFinding;
 use crate::finding::mesh::MeshFinding;
-use crate::mesh::face_view::{GRAZING_TOLERANCE_MM, MOST_TEXEL_PX, view};
+use crate::mesh::face_view::{GRAZING_TOLERANCE_MM, MAX_TEXEL_PX, view};
 use crate::mesh::measures::MESH_TOLERANCE_MM;
 use crate::mesh::print::check_print;
 use crate::model::mesh::Model;
@@ -168,7 +168,7 @@ fn texel_px(model: &Model, panel: &Panel, px_per_mm: f64) -> f64 {
         let is_front = |v: &DVec3| panel.pose.panel_from_target(*v).z.abs() <= MESH_TOLERANCE_MM;
         triangle.vertices_mm.iter().all(is_front).then(|| model.texel_mm(triangle))
     });
-    (sides.fold(0.0, f64::max) * px_per_mm).min(MOST_TEXEL_PX)
+    (sides.fold(0.0, f64::max) * px_per_mm).min(MAX_TEXEL_PX)
 }
 
 fn sees(detection: &Detection, panel: u32) -> bool {

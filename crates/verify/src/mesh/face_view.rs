@@ -7,14 +7,14 @@ use crate::model::view::View;
 use crate::verifier::Verifier;
 use deltille_core::camera::{Camera, Pose};
 use deltille_core::targets::Panel;
-use deltille_files::export::mesh::{LEAST_TEXELS_PER_BIT, UNTAGGED_CELLS};
+use deltille_files::export::mesh::{MIN_TEXELS_PER_BIT, UNTAGGED_CELLS};
 
 /// Tolerance of a corner of a neighbouring face seen at a grazing angle, mm: less than half a tile of any board
 /// detected like this.
 pub(super) const GRAZING_TOLERANCE_MM: f64 = 1.0;
 
 /// Largest size of a texture pixel that widens the tolerance, px of the image: coarser textures are never written.
-pub(super) const MOST_TEXEL_PX: f64 = CELL_PX / LEAST_TEXELS_PER_BIT;
+pub(super) const MAX_TEXEL_PX: f64 = CELL_PX / MIN_TEXELS_PER_BIT;
 
 /// Edge of a tag cell in the image, px.
 const CELL_PX: f64 = 8.0;

@@ -11,7 +11,7 @@ use deltille_core::words::counted;
 pub const MESH_TOLERANCE_MM: f64 = 0.05;
 
 /// A mesh with more than this multiple of the stated triangles is not examined further.
-const MOST_TRIANGLES: usize = 2;
+const MAX_TRIANGLES: usize = 2;
 
 /// Returns the finding about a mesh with a number of triangles other than stated.
 pub(crate) fn other_count(found: usize, stated: usize) -> Option<Finding> {
@@ -21,7 +21,7 @@ pub(crate) fn other_count(found: usize, stated: usize) -> Option<Finding> {
 
 /// Whether a mesh has so many triangles that it must be a different one.
 pub(crate) fn is_other_mesh(found: usize, stated: usize) -> bool {
-    found > MOST_TRIANGLES * stated
+    found > MAX_TRIANGLES * stated
 }
 
 /// Returns the volume enclosed by a closed surface, mm³, by the divergence theorem: the sum of a · (b × c) / 6 over

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use crate::finding::mesh::MeshFinding;
-use crate::mesh::face_view::MOST_TEXEL_PX;
+use crate::mesh::face_view::MAX_TEXEL_PX;
 use crate::mesh::flat_face::{face_outline_mm, face_page, front};
 use crate::mesh::texels::Texels;
 use crate::model::mesh::Model;
@@ -35,7 +35,7 @@ pub(super) fn check_print(
     let high = outline.iter().copied().reduce(DVec2::max).unwrap_or_default() + around_mm;
     let area_mm = [low.x, low.y, high.x, high.y];
     let (mut page, placement) = face_page(model, panel, &front, area_mm, px_per_mm);
-    page.texel_px = page.texel_px.min(MOST_TEXEL_PX);
+    page.texel_px = page.texel_px.min(MAX_TEXEL_PX);
     let placed = PlacedPanel::new(&page, panel, &placement, AffineMap::IDENTITY);
     if let Some(finding) = wrong_tones(&placed) {
         verdict.findings.push(finding);

@@ -21,7 +21,7 @@ use deltille_core::raster::Gray;
 use deltille_core::targets::Panel;
 
 /// Minimum area of a triangle on the texture of a printed face, squared texels.
-const LEAST_AREA: f64 = 1e-6;
+const MIN_AREA: f64 = 1e-6;
 
 /// Texels at a distance of exactly one are not shown: their weight is 0.
 const OPEN: f64 = 1e-6;
@@ -121,7 +121,7 @@ impl Texels<'_> {
 fn affine(texels: [DVec2; 3], flat: [DVec2; 3]) -> Option<DAffine2> {
     let sides = |[a, b, c]: [DVec2; 3]| DMat2::from_cols(b - a, c - a);
     let of_texture = sides(texels);
-    let has_area = of_texture.determinant().abs() >= LEAST_AREA;
+    let has_area = of_texture.determinant().abs() >= MIN_AREA;
     let matrix = has_area.then(|| sides(flat) * of_texture.inverse())?;
     Some(DAffine2::from_mat2_translation(matrix, flat[0] - matrix * texels[0]))
 }

@@ -11,7 +11,7 @@ use crate::net::motion::{FOLD_TOLERANCE_MM, SpaceFromPage};
 use crate::net::printed_net::{Net, Side};
 
 /// Number of roots tried if the first leads to a contradiction: that root may be the misprinted face itself.
-const MOST_ROOTS: usize = 32;
+const MAX_ROOTS: usize = 32;
 
 /// The face of the solid at whose position a printed face ends when the net is folded.
 pub(super) struct Place {
@@ -69,7 +69,7 @@ impl Net {
     /// the root is a misprinted face, all other faces are displaced.
     pub(super) fn best_fold(&self, members: &[usize]) -> Folded {
         let mut best: Option<Folded> = None;
-        for &root in members.iter().take(MOST_ROOTS) {
+        for &root in members.iter().take(MAX_ROOTS) {
             let folded = self.fold(members, root);
             let fewer = |best: &Folded| folded.findings.len() < best.findings.len();
             if best.as_ref().is_none_or(fewer) {
@@ -160,8 +160,8 @@ impl Net {
                 let is_turned_by = |n: &usize| {
                     (0..count).all(|i| place.vertices[(i + count - n) % count] == face.vertices[i])
                 };
-                let turns = (0..count).find(is_turned_by).unwrap_or_default();
-                let angle_deg = 360.0 / count as f64 * turns as f64;
+                let rotations = (0..count).find(is_turned_by).unwrap_or_default();
+                let angle_deg = 360.0 / count as f64 * rotations as f64;
                 findings.push(FoldFinding::FaceTurned { panel, angle_deg });
                 continue;
             }

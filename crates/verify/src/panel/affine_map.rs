@@ -58,7 +58,7 @@ impl AffineMap {
     }
 
     /// Returns the counter-clockwise rotation of the mean of both axes, rad.
-    pub(crate) fn turn_rad(&self) -> f64 {
+    pub(crate) fn rotation_rad(&self) -> f64 {
         let [[a, b], [c, d]] = self.linear;
         (c - b).atan2(a + d)
     }
@@ -83,7 +83,7 @@ mod tests {
         let fitted = AffineMap::fit(&pairs).unwrap();
         assert!((fitted.scales()[0] - scale).abs() < 1e-12);
         assert!((fitted.scales()[1] - scale).abs() < 1e-12);
-        assert!((fitted.turn_rad() - turn).abs() < 1e-12);
+        assert!((fitted.rotation_rad() - turn).abs() < 1e-12);
         assert!((fitted.shift.x - 3.0).abs() < 1e-9);
         assert!(AffineMap::fit(&pairs[..2]).is_none());
     }

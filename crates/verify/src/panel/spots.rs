@@ -6,14 +6,14 @@ use crate::document::page::Page;
 use crate::finding::mark::MarkFinding;
 
 /// Maximum number of spots listed for a page; a page with more is dirty all over.
-const MOST_SPOTS: usize = 200;
+const MAX_SPOTS: usize = 200;
 
 /// Returns a finding for each connected spot of wrong pixels on a page.
 pub(crate) fn named(page: &Page, mut wrong: Vec<bool>) -> Vec<MarkFinding> {
     let (width, height) = (page.image.width(), page.image.height());
     let mut spots = Vec::new();
     for start in 0..wrong.len() {
-        if spots.len() == MOST_SPOTS {
+        if spots.len() == MAX_SPOTS {
             break;
         }
         if !std::mem::take(&mut wrong[start]) {

@@ -237,8 +237,8 @@ fn read_tag(
     let bits = flipped.to_vec();
     let decoded = decoder.decode(word, family.correctable());
     Some(match decoded {
-        Some(read) if (read.id, read.turns) != (id, 0) => {
-            TileFinding::TagReads { id, row, col, reads: read.id, turns: read.turns }
+        Some(read) if (read.id, read.rotations) != (id, 0) => {
+            TileFinding::TagReads { id, row, col, reads: read.id, rotations: read.rotations }
         }
         Some(_) => TileFinding::TagDamaged { id, row, col, bits },
         None => TileFinding::TagUnreadable { id, row, col, bits },

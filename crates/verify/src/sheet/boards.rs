@@ -255,7 +255,7 @@ fn causes(panel: &Panel, map: &AffineMap, pairs: &[(DVec2, DVec2)]) -> Vec<Board
     } else if (scale - 1.0).abs() * radius > TOLERANCE_MM {
         causes.push(BoardFinding::Scale { panel: id, scale });
     }
-    let turn = map.turn_rad();
+    let turn = map.rotation_rad();
     if turn.abs() * radius > TOLERANCE_MM {
         causes.push(BoardFinding::Turned { panel: id, angle_deg: turn.to_degrees() });
     }

@@ -14,7 +14,7 @@ const CELL_PX: f64 = 8.0;
 
 /// A page with a side longer than stated by this factor is not rendered: at the possible resolution, its boards could
 /// not be seen.
-const MOST_ENLARGED: f64 = 10.0;
+const MAX_ENLARGED: f64 = 10.0;
 
 /// A page of a document.
 #[derive(Clone, Copy)]
@@ -35,7 +35,7 @@ impl Source<'_> {
         let tolerance_mm = self.document.size_tolerance_mm();
         let stated_mm = DVec2::new(layout.width_mm, layout.height_mm);
         let found_mm = self.document.size_mm(self.page);
-        if found_mm.cmpgt(MOST_ENLARGED * stated_mm).any() {
+        if found_mm.cmpgt(MAX_ENLARGED * stated_mm).any() {
             return Err(self.document.too_large(found_mm, stated_mm));
         }
         let mut page = self.document.render(self.page, px_per_mm)?;

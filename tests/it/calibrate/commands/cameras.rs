@@ -121,8 +121,8 @@ fn problems_are_reported_on_the_terminal_in_the_file_and_on_the_page() {
     let found = diagnosed("A pole within the image", &good, "--fixed-intrinsics pole.yaml");
     let [diagnosis] = &found["diagnoses"].as_array().unwrap()[..] else { panic!("{found}") };
     // 1.2 (1 − 0.17 · 1.44 + 0.02 · 1.44²) · 625 px.
-    assert_eq!(diagnosis["kind"], "lens_ends");
-    assert!((diagnosis["steady_px"].as_f64().unwrap() - 597.4).abs() < 1.0, "{diagnosis}");
+    assert_eq!(diagnosis["kind"], "non_monotonic_lens");
+    assert!((diagnosis["monotonic_px"].as_f64().unwrap() - 597.4).abs() < 1.0, "{diagnosis}");
 
     let mut bent = flat.clone();
     for corner in &mut bent.panels[0].corners {
@@ -131,7 +131,7 @@ fn problems_are_reported_on_the_terminal_in_the_file_and_on_the_page() {
     }
     let bent = detections(&bent, 15, 0.7);
     for (title, seen, args, kind, key, value) in [
-        ("A bent sheet", &bent, "--model radtan", "remedy", "instead", "board_shape"),
+        ("A bent sheet", &bent, "--model radtan", "remedy", "alternative", "board_shape"),
         (
             "A wrong print scale",
             &good,
@@ -145,7 +145,7 @@ fn problems_are_reported_on_the_terminal_in_the_file_and_on_the_page() {
             &good,
             "--fixed-intrinsics other.yaml",
             "remedy",
-            "instead",
+            "alternative",
             "camera",
         ),
         (

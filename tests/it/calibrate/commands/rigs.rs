@@ -91,7 +91,7 @@ fn a_rig_is_calibrated_from_images() {
     // An unreadable image does not stop the others, and has a line of its own.
     std::fs::write(at.join("broken.png"), "no picture").unwrap();
     let args = "pose left/0.png broken.png left/1.png --target ico.json --camera true.yaml";
-    for (option, count) in [("", 2), (" --every-picture", 3)] {
+    for (option, count) in [("", 2), (" --all-images", 3)] {
         let output = output(at, &format!("{args}{option}"));
         assert_eq!(output.status.code(), Some(1));
         let said = String::from_utf8(output.stdout).unwrap();
@@ -296,11 +296,11 @@ fn a_displaced_panel_is_named_on_the_terminal_in_the_file_and_on_the_page() {
     assert_eq!(output.status.code(), Some(0));
     let id = target.panels[7].id;
     let camera = json(&folder.path().join("camera.json"));
-    assert_eq!(kinds(&camera, "findings"), ["outside_picture", "panel"]);
+    assert_eq!(kinds(&camera, "findings"), ["outside_image", "panel"]);
     let findings = camera["findings"].as_array().unwrap();
     let of_panel = findings.iter().find(|finding| finding["kind"] == "panel").unwrap();
-    assert_eq!((&of_panel["panel"], &of_panel["left_out"]), (&id.into(), &true.into()));
-    assert!((of_panel["moved_mm"].as_f64().unwrap() - 0.6).abs() < 0.05, "{of_panel}");
+    assert_eq!((&of_panel["panel"], &of_panel["excluded"]), (&id.into(), &true.into()));
+    assert!((of_panel["displacement_mm"].as_f64().unwrap() - 0.6).abs() < 0.05, "{of_panel}");
     let outliers = camera["outliers"].as_u64().unwrap();
     assert!(outliers <= of_panel["corners"].as_u64().unwrap() + 2, "{outliers} {of_panel}");
     let page = std::fs::read_to_string(folder.path().join("page.html")).unwrap();

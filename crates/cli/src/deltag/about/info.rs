@@ -2,7 +2,7 @@ use std::process::ExitCode;
 
 use serde_json::{Value, json};
 
-use super::{confusion, false_positives, place_codes};
+use super::{confusion, false_positives, position_codes};
 use crate::deltag::named::resolve;
 use crate::output::{self, ResultFormat, say};
 use deltille::family::{self, Family, HiddenCells, PAIRS_COUNTED, TagWords};
@@ -53,8 +53,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let name = &args.families[0];
     let known = family::resolve(name)?;
-    if known.is_of_places() {
-        place_codes::about(&known, args.result_format)?;
+    if known.is_position_family() {
+        position_codes::about(&known, args.result_format)?;
         return Ok(ExitCode::SUCCESS);
     }
     let family = resolve(name)?;

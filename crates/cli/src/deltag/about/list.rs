@@ -3,7 +3,7 @@ use std::process::ExitCode;
 use serde_json::json;
 
 use crate::output::{self, ResultFormat, say};
-use deltille::family::{self, places, shipped_names};
+use deltille::family::{self, positions, shipped_names};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -21,8 +21,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                 "codes": family.len(), "fingerprint": family.fingerprint(),
             })
         });
-        let of_places = json!({ "name": places::NAME, "bits": places::BITS, "boards": places::BOARDS, "places": places::PLACES });
-        output::print_json(&listed.chain([of_places]).collect::<Vec<_>>())?;
+        let position_codes = json!({ "name": positions::NAME, "bits": positions::BITS, "boards": positions::BOARDS, "positions": positions::POSITIONS });
+        output::print_json(&listed.chain([position_codes]).collect::<Vec<_>>())?;
         return Ok(ExitCode::SUCCESS);
     }
     say!("{:<12} {:>4} {:>8} {:>8}  fingerprint", "family", "bits", "distance", "codes");
@@ -38,9 +38,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     say!(
         "{:<12} {:>4}   position codes of {} boards: `deltag info {0}`",
-        places::NAME,
-        places::BITS,
-        places::BOARDS
+        positions::NAME,
+        positions::BITS,
+        positions::BOARDS
     );
     Ok(ExitCode::SUCCESS)
 }

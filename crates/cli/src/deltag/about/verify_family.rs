@@ -2,7 +2,7 @@ use std::process::ExitCode;
 
 use serde_json::json;
 
-use super::place_codes;
+use super::position_codes;
 use crate::output::{self, ResultFormat, line, say};
 use crate::run::{BAD_INPUT, FAILED, report};
 use deltille::family::{self, Certificate, Family, FamilyFileError, Robust, certify};
@@ -29,7 +29,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     for name in &args.families {
         let mut certificate = None;
         let (holds, what) = match family::resolve(name) {
-            Ok(family) if family.is_of_places() => place_codes::verify(&family),
+            Ok(family) if family.is_position_family() => position_codes::verify(&family),
             Ok(family) => verify(&family, certificate.insert(certify(&family))),
             Err(error) if error.is_broken_claim() => (false, reason(&error).to_string()),
             Err(error) => {
@@ -41,7 +41,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         all_hold &= holds;
         if args.result_format.is_json() {
             results.push(json!({
-                "family": name, "holds": holds, "text": line(&what).trim_end(),
+                "family": name, "valid": holds, "text": line(&what).trim_end(),
                 "distance": certificate.as_ref().map(|found| found.min_distance),
                 "mirror_distance": certificate.and_then(|found| found.mirror_distance),
             }));
@@ -63,7 +63,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 /// Checks the claims of a family; returns whether they are true, and a description.
 fn verify(family: &Family, certificate: &Certificate) -> (bool, String) {
-    if !certificate.holds() {
+    if !certificate.is_valid() {
         return (false, certificate.failures.join("; "));
     }
     let how = proof_of(certificate, family.distance());

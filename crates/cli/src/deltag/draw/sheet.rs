@@ -17,7 +17,7 @@ use deltille::targets::{TagSheetSpec, TargetSpec, parse_length_mm};
 use deltille::verify::{Verifier, VerifyError};
 
 /// Largest number of pages; more are probably a mistake.
-const MOST_PAGES: usize = 200;
+const MAX_PAGES: usize = 200;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -105,8 +105,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let target = Printing::build(&name, &TargetSpec::Tags(spec), Some(&family), Some(&paper))?;
     let pages = target.sheets.len();
     ensure!(
-        pages <= MOST_PAGES,
-        "--ids: {count} tags need {pages} pages, but at most {MOST_PAGES} are allowed: print fewer tags (such as \
+        pages <= MAX_PAGES,
+        "--ids: {count} tags need {pages} pages, but at most {MAX_PAGES} are allowed: print fewer tags (such as \
          --ids 0-99), or use a smaller --edge or larger --paper"
     );
 
@@ -122,7 +122,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let verifier = Verifier::new(&target)?;
-    let verifier = verifier.within(Limits::NONE).stopped_by(interrupt::flag());
+    let verifier = verifier.within(Limits::NONE).cancelled_by(interrupt::flag());
     let mut passed = true;
     for path in &written {
         let verdict = match verifier.verify_path(path) {

@@ -12,7 +12,7 @@ use deltille::export::{png, svg};
 use deltille::layout::Finish;
 
 /// Largest number of tags in one image: about an A0 sheet at the default edge length.
-const MOST_TAGS: usize = 600;
+const MAX_TAGS: usize = 600;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -50,8 +50,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     ids.check(&family)?;
     let Ids(ids) = ids;
     anyhow::ensure!(
-        ids.len() <= MOST_TAGS,
-        "--ids: at most {MOST_TAGS} tags fit in one image; use `deltag sheet` for more"
+        ids.len() <= MAX_TAGS,
+        "--ids: at most {MAX_TAGS} tags fit in one image; use `deltag sheet` for more"
     );
     anyhow::ensure!(args.dpi.is_none() || args.png, "--dpi needs --png");
     let stem = args.name.as_deref().unwrap_or(family.name());

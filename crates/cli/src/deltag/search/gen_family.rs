@@ -59,12 +59,12 @@ pub struct Args {
     #[arg(long, value_name = "STEPS", conflicts_with = "time", allow_negative_numbers = true,
           value_parser = whole(1..=1_000_000u32))]
     work: Option<u32>,
-    /// Start from nothing instead of the shipped family (methods best and algebraic)
-    #[arg(long)]
-    from_nothing: bool,
+    /// Start from scratch instead of the shipped family (methods best and algebraic)
+    #[arg(long, alias = "from-nothing")]
+    from_scratch: bool,
     /// Extend this family without a search: keep its codes and ids, and append the known codes that satisfy the rules
     /// (methods best and algebraic)
-    #[arg(long, value_name = "FAMILY", conflicts_with_all = ["time", "work", "from_nothing", "seed"])]
+    #[arg(long, value_name = "FAMILY", conflicts_with_all = ["time", "work", "from_scratch", "seed"])]
     extend: Option<String>,
     /// Seed of the random number generator of best, algebraic and search [default: 1]
     #[arg(long, allow_negative_numbers = true, value_parser = whole(0..=u64::MAX))]
@@ -214,7 +214,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         );
     } else if let Some(family) = family {
         let certificate = certify_codes(&family);
-        ensure!(certificate.holds(), "{}: {}", path.display(), certificate.failures.join("; "));
+        ensure!(certificate.is_valid(), "{}: {}", path.display(), certificate.failures.join("; "));
         say!(
             "{}: {} of {} bits; {}; fingerprint {}",
             path.display(),
@@ -346,7 +346,7 @@ impl Args {
         };
         refuse("--time", self.time.is_some(), &[Algebraic, Best, Search])?;
         refuse("--work", self.work.is_some(), &[Algebraic, Best])?;
-        refuse("--from-nothing", self.from_nothing, &[Algebraic, Best])?;
+        refuse("--from-scratch", self.from_scratch, &[Algebraic, Best])?;
         refuse("--extend", self.extend.is_some(), &[Algebraic, Best])?;
         refuse("--false-positives", self.choice.false_positives.is_some(), &[Algebraic, Best])?;
         refuse("--limit", self.limit.is_some(), &[Algebraic, Best])?;
@@ -380,7 +380,7 @@ impl Args {
             Method::Lexicode => String::new(),
             _ => format!(", seed {}", self.seed()),
         };
-        let from = if self.from_nothing { ", from nothing" } else { "" };
+        let from = if self.from_scratch { ", from nothing" } else { "" };
         let counted = if self.work.is_some() { ", by work" } else { "" };
         let limit = self.limit.map(|limit| format!(", limit {limit}")).unwrap_or_default();
         let Rules { min_complexity, black_distance, white_distance, robust, free } = rules;
@@ -488,7 +488,7 @@ impl Args {
                 checkpoint.legs_done
             );
         }
-        let start = if self.from_nothing { None } else { best.start() };
+        let start = if self.from_scratch { None } else { best.start() };
         let extended = self.extend.as_deref();
         let extended = extended.map(|older| extended_by(name, &best, start.as_ref(), older));
         let extended = extended.transpose()?;

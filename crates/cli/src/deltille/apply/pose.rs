@@ -12,7 +12,7 @@ use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::{camera_file, target_file};
 use crate::output::{self, Overwrite, log, say};
 use crate::run::FAILED;
-use deltille::calibrate::{Calibration, Diagnosis, Estimate, Reference, Words, views};
+use deltille::calibrate::{Calibration, Diagnosis, Estimate, Messages, Reference, views};
 use deltille::camera::Camera;
 use deltille::detect::{Detection, Detector, DetectorConfig};
 use deltille::export::kind::Kind;
@@ -45,8 +45,8 @@ pub struct Args {
     #[arg(long)]
     family: Option<String>,
     /// Write a line for every image and target: without a pose, camera_from_target is null and reason explains why
-    #[arg(long)]
-    every_picture: bool,
+    #[arg(long, alias = "every-picture")]
+    all_images: bool,
     /// Write to a file instead of standard output
     #[arg(short, long, value_name = "FILE.ndjson")]
     output: Option<PathBuf>,
@@ -94,7 +94,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             Seen::Unread(why) => {
                 log!("error: {why}");
                 (without, unread) = (without + 1, unread + 1);
-                for target in finder.targets.iter().filter(|_| args.every_picture) {
+                for target in finder.targets.iter().filter(|_| args.all_images) {
                     of_image += &(pose::write_none(&name, &target.name, &why) + "\n");
                 }
             }
@@ -113,7 +113,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                             if !is_there {
                                 log!("{}: {}{why}", image.display(), finder.of_target(target));
                             }
-                            if args.every_picture {
+                            if args.all_images {
                                 let line = pose::write_none(&name, &target.name, &why);
                                 of_image += &(line + "\n");
                             }
@@ -190,9 +190,11 @@ impl Finder {
         let calibration = Calibration::new(panels).camera("", views, self.camera.clone());
         let found = calibration.located(&seen[0].1).with_context(|| image.display().to_string())?;
         let Ok(found) = found else { return Ok(found) };
-        let (words, said) = (Words::new(&found, None), found.diagnose());
+        let (words, said) = (Messages::new(&found, None), found.diagnose());
         // The limit of the lens is a property of the camera, equal for all images.
-        for diagnosis in said.iter().filter(|said| !matches!(said, Diagnosis::LensEnds { .. })) {
+        for diagnosis in
+            said.iter().filter(|said| !matches!(said, Diagnosis::NonMonotonicLens { .. }))
+        {
             let of_target = self.of_target(target);
             log!("{}: {of_target}{}", image.display(), words.sentence(diagnosis));
         }

@@ -182,8 +182,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 /// Describes a view in one line.
 fn describe(view: &Camera, map: &PixelMap) -> String {
     let field = |side: u32| 2.0 * (f64::from(side) / 2.0 / view.focal_px.x).atan().to_degrees();
-    let [x, y, width, height] = map.whole_rectangle();
-    let whole = match map.covered() {
+    let [x, y, width, height] = map.valid_rectangle();
+    let whole = match map.valid_fraction() {
         1.0 => "every pixel is covered".to_owned(),
         part => format!(
             "{:.1} % of pixels are covered; {width} × {height} px from ({x}, {y}) are fully covered",

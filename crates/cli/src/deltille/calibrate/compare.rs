@@ -110,11 +110,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             "{} relative to {}: rotated by {:.4}°, translated by {:.3} mm: {}",
             shown(&motion.to),
             shown(&motion.from),
-            motion.turn_rad.length().to_degrees(),
-            motion.moved_mm.length(),
+            motion.rotation_rad.length().to_degrees(),
+            motion.translation_mm.length(),
             match motion.why_undecided() {
                 Some(why) => format!("cannot determine whether it has moved: {why}"),
-                None => verdict(motion.chance, motion.is_significant(), "it has moved"),
+                None => verdict(motion.p_value, motion.is_significant(), "it has moved"),
             }
         );
     }
@@ -225,7 +225,7 @@ fn describe(camera: &CameraEstimate, found: &Comparison, tolerance: f64) -> Stri
     let expected = match (found.expected_px, found.why_undecided()) {
         (Some(px), _) => format!(
             "{name}expected from both uncertainties: {px:.4} px: {}\n",
-            verdict(found.chance, found.is_significant(), &meaning)
+            verdict(found.p_value, found.is_significant(), &meaning)
         ),
         (None, _) if verdict_of(found) == Verdict::Same && tolerance > 0.0 => {
             format!("{name}{meaning}\n")
@@ -255,12 +255,12 @@ fn describe(camera: &CameraEstimate, found: &Comparison, tolerance: f64) -> Stri
 }
 
 /// States whether a difference is significant.
-fn verdict(chance: Option<f64>, is_significant: Option<bool>, changed: &str) -> String {
-    match (chance, is_significant) {
-        (Some(chance), Some(true)) => {
-            format!("significant ({}): {changed}", p_value(chance))
+fn verdict(probability: Option<f64>, is_significant: Option<bool>, changed: &str) -> String {
+    match (probability, is_significant) {
+        (Some(probability), Some(true)) => {
+            format!("significant ({}): {changed}", p_value(probability))
         }
-        (Some(chance), _) => format!("not significant ({})", p_value(chance)),
+        (Some(probability), _) => format!("not significant ({})", p_value(probability)),
         (None, _) => String::new(),
     }
 }

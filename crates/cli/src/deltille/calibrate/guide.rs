@@ -18,7 +18,7 @@ use crate::output::{self, Overwrite, log, say};
 use crate::run::Interrupted;
 use crate::values::distance;
 use deltille::calibrate::{
-    Calibration, Excluded, Guide, Intrinsics, Model, NextView, PanelPlace, Reference, View, views,
+    Calibration, Excluded, Guide, Intrinsics, Model, NextView, PanelPrior, Reference, View, views,
 };
 use deltille::camera::{Camera, Lens};
 use deltille::detect::{Detection, Detector, DetectorConfig};
@@ -264,7 +264,7 @@ struct Watch<'a> {
     target: &'a Target,
     detector: Detector,
     sheet: Sheet,
-    panels: Vec<PanelPlace>,
+    panels: Vec<PanelPrior>,
     intrinsics: Intrinsics,
     limits: Limits,
     places: Places,
@@ -279,7 +279,7 @@ impl Watch<'_> {
     fn run(mut self) -> anyhow::Result<ExitCode> {
         let mut is_first = true;
         loop {
-            let (changed, last) = self.look()?;
+            let (changed, last) = self.observe()?;
             let waits = self.pictures.values().any(|picture| picture.seen.is_none());
             // Waits for pending photographs before proposing a view.
             if (changed || is_first) && !(self.args.once && waits) {
@@ -307,7 +307,7 @@ impl Watch<'_> {
     }
 
     /// Reads new files in the folder. Returns whether anything changed, and the last photograph read.
-    fn look(&mut self) -> anyhow::Result<(bool, Option<AnyGray>)> {
+    fn observe(&mut self) -> anyhow::Result<(bool, Option<AnyGray>)> {
         let there = photographs_in(&self.args.folder)?;
         let before = self.pictures.len();
         self.pictures.retain(|path, _| there.contains(path));
@@ -396,7 +396,7 @@ impl Watch<'_> {
             }
         };
         sightings::put_on(&self.sheet, Some(self.target), &mut shown.views)?;
-        out.extend(shown.left_out.iter().map(|(_, left)| excluded_line(left)));
+        out.extend(shown.excluded.iter().map(|(_, left)| excluded_line(left)));
         Ok((shown.views, out))
     }
 

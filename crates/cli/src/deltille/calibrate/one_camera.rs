@@ -241,7 +241,7 @@ fn of_camera(camera: &CameraEstimate) -> String {
         let _ = writeln!(text, "{line}");
     }
     // Correlations of neighbouring knots are not of interest.
-    let found: Vec<&str> = camera.found().filter(|_| spline.is_none()).collect();
+    let found: Vec<&str> = camera.estimated_parameters().filter(|_| spline.is_none()).collect();
     for i in 0..found.len() {
         for j in i + 1..found.len() {
             let correlation = camera.correlation(i, j);

@@ -15,7 +15,7 @@ use deltille_core::name::is_within;
 use deltille_core::words::counted;
 
 /// Largest number of thumbnails of held-out views.
-const MOST_HELD_OUT: usize = 100;
+const MAX_HELD_OUT: usize = 100;
 
 impl Calibrated {
     /// Writes the report; `folders` contains the photograph folder of each camera.
@@ -32,7 +32,7 @@ impl Calibrated {
             let is_there = |view: &&ViewEstimate| picture_of(&view.image, folder).is_some();
             let shown = Sample::best(camera, is_there).map(|view| view.name.as_str());
             let held_out = self.estimate.held_out.iter().flat_map(|test| test.cameras.get(index));
-            let held_out = held_out.flat_map(|camera| &camera.views).take(MOST_HELD_OUT);
+            let held_out = held_out.flat_map(|camera| &camera.views).take(MAX_HELD_OUT);
             // Reads only the views shown in the report, and the one that is undistorted.
             let more = camera.views.iter().filter(|view| shown == Some(view.name.as_str()));
             let views = shown_views(camera).into_iter().chain(more).chain(held_out);

@@ -12,7 +12,7 @@ use crate::output::log;
 use crate::values::whole;
 use deltille::SheetUseError;
 use deltille::calibrate::{
-    Calibration, Excluded, PanelPlace, Reason, Reference, Shown, UntaggedGrid, View, views,
+    Calibration, Excluded, PanelPrior, Reason, Reference, UntaggedGrid, View, ViewSet, views,
 };
 use deltille::detect::{Detection, InkEstimate};
 use deltille::export::calibration::Print;
@@ -208,14 +208,14 @@ impl SheetArgs {
 
 /// Removes and reports the views in which corners cannot be identified.
 pub fn take_sure(views: &mut Vec<View>, reference: &Reference) -> anyhow::Result<Vec<Excluded>> {
-    let is_any_sure = views.iter().any(|view| reference.is_sure_of(view));
+    let is_any_sure = views.iter().any(|view| reference.has_certain_labels(view));
     ensure!(
         is_any_sure || views.is_empty(),
         "--measure-target: none of {} shows all corners of the board; an untagged board must be fully visible to be \
          measured",
         counted(views.len(), "image")
     );
-    let unsure = views.extract_if(.., |view| !reference.is_sure_of(view));
+    let unsure = views.extract_if(.., |view| !reference.has_certain_labels(view));
     Ok(unsure.map(|view| left_out(view, NOT_WHOLE)).collect())
 }
 
@@ -247,7 +247,7 @@ const NOT_WHOLE: &str =
     "an untagged board must be fully visible to be measured, because its corners have no ids";
 
 /// Returns the panel positions of the target, see [`Sheet::panels`].
-pub fn panels(reference: &Reference, sheet: &Sheet) -> anyhow::Result<Vec<PanelPlace>> {
+pub fn panels(reference: &Reference, sheet: &Sheet) -> anyhow::Result<Vec<PanelPrior>> {
     sheet.panels(reference).map_err(as_option_error)
 }
 
@@ -340,7 +340,7 @@ pub fn read(
     if is_assumed {
         assume(&mut detections, reference);
     }
-    let Shown { views, empty, left_out, .. } = views(&detections, reference)?;
+    let ViewSet { views, empty, excluded: left_out, .. } = views(&detections, reference)?;
     for (index, out) in &left_out {
         log!("warning: excluded: {}: {}", files[*index].display(), out.reason);
     }

@@ -14,8 +14,8 @@ use crate::run::FAILED;
 use crate::values::{distance, whole};
 use deltille::calibrate::{
     BoardShape, Calibration, CalibrationError, CameraEstimate, Candidate, Diagnosis, Estimate,
-    Intrinsics, LEAST_TO_MEASURE, Loss, Model, ModelError, PanelPlace, Source, TargetMap, Weights,
-    Words,
+    Intrinsics, Loss, MIN_VIEWS_TO_MEASURE, Messages, Model, ModelError, PanelPrior, Source,
+    TargetMap, Weights,
 };
 use deltille::camera::Camera;
 use deltille::export::calibration::{Print, Residuals};
@@ -147,7 +147,7 @@ pub fn chosen(tried: &[Candidate]) -> String {
     for candidate in tried {
         let held_out =
             candidate.held_out_px.map_or("did not converge".to_owned(), |px| format!("{px:.4}"));
-        let note = match (candidate.chosen, candidate.holds) {
+        let note = match (candidate.chosen, candidate.is_adequate) {
             (true, _) => "  selected",
             (_, true) => "  equally good",
             _ if candidate.held_out_px.is_some() && !candidate.is_stable => "  ill-conditioned",
@@ -169,7 +169,7 @@ pub struct Calibrated {
     pub estimate: Estimate,
     pub diagnoses: Vec<Diagnosis>,
     /// Panel positions in the target's file.
-    pub stated: Vec<PanelPlace>,
+    pub stated: Vec<PanelPrior>,
     pub print: Print,
     /// Candidate models, by camera.
     pub models: Vec<Vec<Candidate>>,
@@ -193,7 +193,7 @@ impl SolveArgs {
 
     /// Whether files include every corner with its residual.
     pub fn residuals(&self) -> Residuals {
-        if self.residuals { Residuals::Listed } else { Residuals::LeftOut }
+        if self.residuals { Residuals::Listed } else { Residuals::Omitted }
     }
 
     /// Calibrates; `tried` contains the candidate models by camera.
@@ -227,7 +227,7 @@ impl SolveArgs {
             let option = match error {
                 CalibrationError::NothingHeldOut { .. } => Some("--holdout"),
                 CalibrationError::ShapeOfMany { .. } => Some("--board-shape"),
-                CalibrationError::ForeignCameras { .. } => Some("--known"),
+                CalibrationError::WrongCameras { .. } => Some("--known"),
                 _ => None,
             };
             match option {
@@ -263,10 +263,10 @@ impl SolveArgs {
 impl Calibrated {
     /// Prints the diagnoses on standard error. Fails if the images were not taken by a fixed camera.
     pub fn print_diagnoses(&self) -> anyhow::Result<()> {
-        let words = Words::new(&self.estimate, self.print.scale);
+        let words = Messages::new(&self.estimate, self.print.scale);
         for diagnosis in &self.diagnoses {
             let text = words.sentence(diagnosis);
-            if matches!(diagnosis, Diagnosis::ForeignCamera { .. }) {
+            if matches!(diagnosis, Diagnosis::WrongCamera { .. }) {
                 bail!("{text}; nothing was written");
             }
             let kind = if diagnosis.is_failure() { "error" } else { "warning" };
@@ -370,11 +370,11 @@ pub fn sample(intrinsics: &Intrinsics) -> Camera {
 /// Describes the estimated corner positions, and their significance.
 fn mapped(map: &TargetMap, views: usize) -> String {
     let [plane, out] = map.rms_mm();
-    let few = match views >= LEAST_TO_MEASURE {
+    let few = match views >= MIN_VIEWS_TO_MEASURE {
         true => String::new(),
         false => {
             format!(
-                "; a corner is in {}, but {LEAST_TO_MEASURE} or more are recommended",
+                "; a corner is in {}, but {MIN_VIEWS_TO_MEASURE} or more are recommended",
                 counted(views, "view")
             )
         }

@@ -11,14 +11,14 @@ use anyhow::Context;
 use crate::output::{Overwrite, log};
 use deltille::export::kind::Kind;
 use deltille::export::staging::Staging;
-use deltille::export::tables::{CORNERS, EXTENSION, PICTURES, Picture, Writer, folder};
+use deltille::export::tables::{CORNERS, EXTENSION, IMAGES, ImageRecord, Writer, folder};
 use deltille::limits::Limits;
 use deltille::targets::Target;
 use deltille_core::words::counted;
 
 /// Returns the paths of both tables in a folder.
 pub fn files(folder: &Path) -> [PathBuf; 2] {
-    [CORNERS, PICTURES].map(|table| folder.join(format!("{table}.{EXTENSION}")))
+    [CORNERS, IMAGES].map(|table| folder.join(format!("{table}.{EXTENSION}")))
 }
 
 /// Tables being written. Images are written in order, whichever is finished first.
@@ -32,7 +32,7 @@ struct State {
     writer: Writer<BufWriter<File>>,
     next: usize,
     /// Images finished before an earlier one; `None` if no row is to be written.
-    waiting: BTreeMap<usize, Option<Picture>>,
+    waiting: BTreeMap<usize, Option<ImageRecord>>,
     written: BTreeSet<String>,
     error: Option<anyhow::Error>,
 }
@@ -42,13 +42,13 @@ impl Tables {
     pub fn begin(folder: &Path, targets: &[Target]) -> anyhow::Result<Self> {
         let cannot = || format!("cannot write to {}", folder.display());
         let staging = Staging::new(folder).with_context(cannot)?;
-        let [corners, pictures] = files(&staging.files());
+        let [corners, images] = files(&staging.files());
         let open = |path| Ok::<_, std::io::Error>(BufWriter::new(File::create_new(path)?));
-        let writer = open(corners).and_then(|corners| Ok((corners, open(pictures)?)));
-        let (corners, pictures) = writer.with_context(cannot)?;
+        let writer = open(corners).and_then(|corners| Ok((corners, open(images)?)));
+        let (corners, images) = writer.with_context(cannot)?;
         let state = State {
             staging,
-            writer: Writer::new(corners, pictures, targets)?,
+            writer: Writer::new(corners, images, targets)?,
             next: 0,
             waiting: BTreeMap::new(),
             written: BTreeSet::new(),
@@ -58,7 +58,7 @@ impl Tables {
     }
 
     /// Adds the result of the image at `index`; `None` if it has no row.
-    pub fn add(&self, index: usize, picture: Option<Picture>) {
+    pub fn add(&self, index: usize, picture: Option<ImageRecord>) {
         let mut state = self.state();
         state.waiting.insert(index, picture);
         loop {
@@ -70,7 +70,7 @@ impl Tables {
     }
 
     /// Moves both tables into their folder, with the rows of `earlier` for images that were not processed.
-    pub fn finish(self, earlier: &[Picture]) -> anyhow::Result<()> {
+    pub fn finish(self, earlier: &[ImageRecord]) -> anyhow::Result<()> {
         let mut state = self.state.into_inner().expect("no thread panics here");
         // An interruption leaves gaps.
         for picture in std::mem::take(&mut state.waiting).into_values().flatten() {
@@ -85,8 +85,8 @@ impl Tables {
             Ok(staging.commit()?)
         };
         error.map_or_else(end, Err).with_context(|| {
-            let [corners, pictures] = files(&self.folder);
-            format!("cannot write {} and {}", corners.display(), pictures.display())
+            let [corners, images] = files(&self.folder);
+            format!("cannot write {} and {}", corners.display(), images.display())
         })
     }
 
@@ -96,7 +96,7 @@ impl Tables {
 }
 
 impl State {
-    fn push(&mut self, picture: &Picture) {
+    fn push(&mut self, picture: &ImageRecord) {
         if self.error.is_none() && self.written.insert(picture.image.clone()) {
             self.error = self.writer.push(picture).err().map(Into::into);
         }
@@ -114,7 +114,7 @@ pub fn are_in(folder: &Path) -> bool {
 }
 
 /// Returns the images of an earlier run in a folder; empty without tables.
-pub fn earlier(folder: &Path, limits: &Limits) -> anyhow::Result<Vec<Picture>> {
+pub fn earlier(folder: &Path, limits: &Limits) -> anyhow::Result<Vec<ImageRecord>> {
     let files = files(folder);
     match files.iter().any(|file| file.exists()) {
         true => read(&files, limits),
@@ -123,11 +123,11 @@ pub fn earlier(folder: &Path, limits: &Limits) -> anyhow::Result<Vec<Picture>> {
 }
 
 /// Reads the images of table files.
-pub fn read(files: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<Picture>> {
+pub fn read(files: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<ImageRecord>> {
     let read = folder::read(files, limits)?;
     if read.short > 0 {
         let have = if read.short == 1 { "has" } else { "have" };
         log!("warning: {} {have} fewer corners than were detected", counted(read.short, "image"));
     }
-    Ok(read.pictures)
+    Ok(read.images)
 }

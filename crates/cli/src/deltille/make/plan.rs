@@ -8,7 +8,7 @@ use anyhow::{Context, bail, ensure};
 use crate::deltille::files::camera_file;
 use crate::output::{self, ResultFormat, say};
 use crate::values::{distance, number};
-use deltille::family::{self, places};
+use deltille::family::{self, positions};
 use deltille::lattice::GridKind;
 use deltille::layout::PaperSpec;
 use deltille::layout::{Proposal, Situation};
@@ -114,7 +114,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let named = match (&args.family, args.checker || args.untagged) {
         (Some(name), _) => Some(name.clone()),
         (None, true) => None,
-        (None, false) if args.dense => Some(places::NAME.to_owned()),
+        (None, false) if args.dense => Some(positions::NAME.to_owned()),
         (None, false) => Some(TagSpec::default().family),
     };
     let option = if args.checker { "--tags" } else { "--family" };

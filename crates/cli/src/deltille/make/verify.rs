@@ -101,8 +101,8 @@ pub fn prove(
         bar.set_length(total as u64);
         bar.set_position(done as u64);
     };
-    let verifier = Verifier::new(printing)?.within(limits).stopped_by(interrupt::flag());
-    let verifier = verifier.telling(&show);
+    let verifier = Verifier::new(printing)?.within(limits).cancelled_by(interrupt::flag());
+    let verifier = verifier.with_progress(&show);
     let mut proof = Proof::of(&printing.target);
     let mut done = BTreeSet::new();
     for path in artifacts {
@@ -133,7 +133,7 @@ pub fn prove(
             }
         }
     }
-    for verdict in verifier.left_out(artifacts, alone) {
+    for verdict in verifier.incomplete_sets(artifacts, alone) {
         proof.add(verdict, result_format)?;
     }
     Ok(proof)

@@ -20,7 +20,7 @@ use deltille::clock;
 use deltille::detect::{Detection, Detector, InkEstimate};
 use deltille::export::kind::Kind;
 use deltille::export::named::Format;
-use deltille::export::tables::Picture;
+use deltille::export::tables::ImageRecord;
 use deltille::export::{DETECTION_FORMATS, DetectionFormat, atomic, detection, overlay};
 use deltille::photograph::{self, Photograph};
 use deltille::targets::Target;
@@ -80,7 +80,7 @@ struct Found {
     /// Whether the requested target or grid was found.
     is_there: bool,
     /// The table row, if tables are written.
-    row: Option<Picture>,
+    row: Option<ImageRecord>,
 }
 
 /// A processed image.
@@ -152,7 +152,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let report = Report::new(images.count() == Some(1), go_on);
     let seen: Mutex<Vec<Seen>> = Mutex::default();
     // Rows of images that were not processed, if they have one.
-    let unseen: Mutex<Vec<(usize, Option<Picture>)>> = Mutex::default();
+    let unseen: Mutex<Vec<(usize, Option<ImageRecord>)>> = Mutex::default();
     let threads = threads.build()?;
     images_at_once::for_each(&threads, &limits, claimed, |index, image| {
         if interrupt::is_raised() {
@@ -218,7 +218,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 fn note_ink_of_all(detector: &Detector, seen: &[Seen]) {
     let found: Vec<Option<InkEstimate>> = seen.iter().map(|seen| seen.ink).collect();
     if let Some(ink) = detector.ink_of_all(&found) {
-        let images = counted(ink.pictures as usize, "image");
+        let images = counted(ink.images as usize, "image");
         log!(
             "note: --stream used a separate ink estimate for each image; without it, corners are located with the \
              joint estimate, {ink} ({images}), and differ slightly"
@@ -233,7 +233,7 @@ fn see_again(
     targets: &[Target],
     detector: &Detector,
     seen: &[Seen],
-    unseen: Vec<(usize, Option<Picture>)>,
+    unseen: Vec<(usize, Option<ImageRecord>)>,
     threads: &rayon::ThreadPool,
     report: &Report,
 ) -> anyhow::Result<Option<Tables>> {
@@ -268,7 +268,7 @@ fn see_again(
         });
         bar.finish_and_clear();
     }
-    log!("ink: {ink} ({})", counted(ink.pictures as usize, "image"));
+    log!("ink: {ink} ({})", counted(ink.images as usize, "image"));
     Ok(tables)
 }
 
@@ -278,11 +278,11 @@ fn name_of(image: &Path) -> String {
 }
 
 /// Returns the table row of an image, if it has one.
-fn row_of(name: Option<String>, result: &mut anyhow::Result<Outcome>) -> Option<Picture> {
+fn row_of(name: Option<String>, result: &mut anyhow::Result<Outcome>) -> Option<ImageRecord> {
     match result {
         Ok(Outcome::Seen(found)) => found.row.take(),
         Ok(Outcome::Skipped) => None,
-        Err(error) => Some(Picture::unread(name?, run::message(error))),
+        Err(error) => Some(ImageRecord::unread(name?, run::message(error))),
     }
 }
 
@@ -445,7 +445,7 @@ fn one_image(
         false => found.grids.iter().any(|grid| grid.panel.is_some()),
         true => !found.grids.is_empty(),
     };
-    let row = args.tables().map(|_| Picture::of(&found));
+    let row = args.tables().map(|_| ImageRecord::of(&found));
     Ok(Found { line, ink: found.ink, is_there, row })
 }
 

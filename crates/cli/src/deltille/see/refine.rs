@@ -18,7 +18,7 @@ use deltille::photograph;
 use deltille::raster::AnyGray;
 
 /// Largest number of corners to refine, about as many as in one image.
-const MOST_SEEDS: usize = 20_000;
+const MAX_SEEDS: usize = 20_000;
 
 /// Arguments of `deltille refine`.
 #[derive(clap::Args)]
@@ -125,9 +125,9 @@ fn read_seeds(path: &Path, limits: &Limits) -> anyhow::Result<Vec<DVec2>> {
     let text = limits.read_text(path)?;
     let seeds = csv::read_points(&text);
     let seeds = seeds.map_err(|problem| anyhow!("{}: {problem}", path.display()))?;
-    if seeds.len() > MOST_SEEDS {
+    if seeds.len() > MAX_SEEDS {
         bail!(
-            "{}: {} points, but at most {MOST_SEEDS} can be refined at a time",
+            "{}: {} points, but at most {MAX_SEEDS} can be refined at a time",
             path.display(),
             seeds.len()
         );

@@ -16,7 +16,7 @@ use deltille::camera::{Camera, Pose};
 use deltille::export::kind::signed_png;
 use deltille::export::truth;
 use deltille::synth::{Light, scene_of_target};
-use deltille_core::quantity::{Range, blur_px, light_gradient, of_full_scale, place_mm};
+use deltille_core::quantity::{Range, blur_px, light_gradient, of_full_scale, position_mm};
 
 /// Arguments of `deltille render`.
 #[derive(clap::Args)]
@@ -164,7 +164,7 @@ impl Args {
 
 /// Parses N comma-separated coordinates within the range of positions.
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    numbers_of(place_mm::RANGE, text)
+    numbers_of(position_mm::RANGE, text)
 }
 
 /// Parses a relative change of the brightness across and down an image.

@@ -22,7 +22,7 @@ impl CosetUnion {
     pub fn orbits(&self) -> Vec<u64> {
         let space = self.space;
         let words = self.cosets.iter().flat_map(|&c| self.code.words().map(move |w| w ^ c));
-        words.filter(|&w| space.turn(w) != w && space.canonical(w) == w).collect()
+        words.filter(|&w| space.rotate(w) != w && space.canonical(w) == w).collect()
     }
 
     /// Returns the number of orbits of three words, and at most `most` of them, evenly distributed. A linear code of

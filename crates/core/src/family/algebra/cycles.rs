@@ -37,7 +37,7 @@ impl CycleSpace {
 
     /// Returns the word after one rotation of the tag by 120°.
     #[inline]
-    pub fn turn(self, word: u64) -> u64 {
+    pub fn rotate(self, word: u64) -> u64 {
         let (first, cycles) = (self.firsts(), (1 << (3 * self.cycles)) - 1);
         let moved = word & (first | first << 1);
         (moved << 1) | ((word >> 2) & first) | (word & !cycles)
@@ -46,8 +46,8 @@ impl CycleSpace {
     /// Returns the representative of the orbit: the smallest of the three rotated words.
     #[inline]
     pub fn canonical(self, word: u64) -> u64 {
-        let once = self.turn(word);
-        word.min(once).min(self.turn(once))
+        let once = self.rotate(word);
+        word.min(once).min(self.rotate(once))
     }
 
     /// Returns a basis of the words that the rotation fixes: each whole cycle, and the central bit.
@@ -207,7 +207,7 @@ mod tests {
             arrangement.inverted = inverted & ((1 << (space.cycles + u32::from(space.centre))) - 1);
             prop_assert!(arrangement.fits(space));
             let [direct, turned] =
-                arrangement.apply(dimension, &[word, space.turn(word)])[..] else { unreachable!() };
+                arrangement.apply(dimension, &[word, space.rotate(word)])[..] else { unreachable!() };
             prop_assert_eq!(TagCells::new(dimension).rotate(direct), turned);
             prop_assert_eq!(Placing::new(&arrangement, dimension).on_tag(word), direct);
         }

@@ -20,17 +20,17 @@ pub struct Ranked {
 impl Ranked {
     /// Numbers the orbits of `code`; `None` if the code is not invariant under the rotation.
     pub fn new(space: CycleSpace, code: &Span) -> Option<Self> {
-        if !code.rows().iter().all(|&row| code.contains(space.turn(row))) {
+        if !code.rows().iter().all(|&row| code.contains(space.rotate(row))) {
             return None;
         }
-        let trace = |w: u64| w ^ space.turn(w) ^ space.turn(space.turn(w));
+        let trace = |w: u64| w ^ space.rotate(w) ^ space.rotate(space.rotate(w));
         let fixed = Span::of(code.rows().iter().map(|&row| trace(row))).rows().to_vec();
         let mut span = Span::default();
         let mut lines = Vec::new();
         for &row in code.rows() {
             let word = row ^ trace(row);
             if span.insert(word) {
-                span.insert(space.turn(word));
+                span.insert(space.rotate(word));
                 lines.push(word);
             }
         }
@@ -68,7 +68,7 @@ impl Ranked {
         }
         word ^= self.lines[lead];
         for (i, &line) in self.lines[..lead].iter().enumerate() {
-            let once = self.space.turn(line);
+            let once = self.space.rotate(line);
             word ^= [0, line, once, line ^ once][(point >> (2 * i) & 0b11) as usize];
         }
         Some(word)

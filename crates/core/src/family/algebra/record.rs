@@ -65,7 +65,8 @@ impl AlgebraicConstruction {
         }
         let union = self.union(dimension)?;
         let exchanged = self.words("exchanged", &self.exchanged, dimension)?;
-        let turned: Vec<u64> = exchanged.iter().flat_map(|&w| screen.words().turns(w)).collect();
+        let turned: Vec<u64> =
+            exchanged.iter().flat_map(|&w| screen.words().rotations(w)).collect();
         let mut codes = arranged(screen, &union, &self.arrangement);
         let order = |codes: &mut Vec<u64>| {
             codes.sort_by_cached_key(|&code| screen.words().canonical(code));
@@ -86,7 +87,7 @@ impl AlgebraicConstruction {
     /// Lists the codes of a construction with a stride.
     fn strided(&self, screen: &Screen, stride: u64) -> Result<Vec<u64>, FamilyError> {
         /// Maximum number of codes: for 64 bits, they take a gigabyte of memory and two of a file.
-        const MOST_CODES: u64 = 1 << 27;
+        const MAX_CODES: u64 = 1 << 27;
         /// Number of tags tried for each code.
         const TRIED: u64 = 64;
         let wrong = |field, problem: &str| {
@@ -111,7 +112,7 @@ impl AlgebraicConstruction {
                 format!("{stride} and the number of tags, {count}, have a common divisor");
             return Err(wrong("stride", &problem));
         }
-        let limit = self.limit.filter(|&limit| limit <= MOST_CODES);
+        let limit = self.limit.filter(|&limit| limit <= MAX_CODES);
         let limit =
             limit.ok_or_else(|| wrong("limit", "a stride needs a limit of at most 2^27 codes"))?;
         let place = Placing::new(&self.arrangement, dimension);
@@ -155,7 +156,7 @@ impl AlgebraicConstruction {
     /// dimensions.
     pub fn union(&self, dimension: Dimension) -> Result<CosetUnion, FamilyError> {
         let code = Span::of(self.words("basis", &self.basis, dimension)?);
-        if code.dimension() > MOST_DIMENSIONS {
+        if code.dimension() > MAX_DIMENSIONS {
             return Err(FamilyError::field(
                 "construction.basis",
                 "the basis has more than 26 dimensions",
@@ -236,7 +237,7 @@ impl AlgebraicConstruction {
         if !self.exchanged.is_empty() || cosets != [0] {
             return Err("the construction is more than a linear code".to_owned());
         }
-        if !code.rows().iter().all(|&row| code.contains(space.turn(row))) {
+        if !code.rows().iter().all(|&row| code.contains(space.rotate(row))) {
             return Err("the linear code is not invariant under rotation of the tag".to_owned());
         }
         let weights = weights(&code, space.bits());
@@ -244,7 +245,7 @@ impl AlgebraicConstruction {
         if (1..screen.distance()).any(|weight| weights[weight as usize] > 0) {
             return Err("the linear code has a word lighter than the distance".to_owned());
         }
-        if screen.is_robust() && code.dimension() > MOST_DIMENSIONS {
+        if screen.is_robust() && code.dimension() > MAX_DIMENSIONS {
             return Err("the linear code has too many words to check with hidden cells".to_owned());
         }
         let union = CosetUnion { space, code, cosets };
@@ -283,7 +284,7 @@ impl AlgebraicConstruction {
 }
 
 /// Largest number of dimensions; beyond it, the list of words would not fit in memory.
-const MOST_DIMENSIONS: u32 = 26;
+const MAX_DIMENSIONS: u32 = 26;
 
 /// Returns the words that are far enough from all those taken before, up to `limit`.
 fn taken_in_order(screen: &Screen, words: impl Iterator<Item = u64>, limit: usize) -> Vec<u64> {
@@ -291,7 +292,7 @@ fn taken_in_order(screen: &Screen, words: impl Iterator<Item = u64>, limit: usiz
     for word in words {
         if taken.len() < limit && screen.is_apart_from(word, &turned) {
             taken.push(word);
-            turned.extend(screen.words().turns(word));
+            turned.extend(screen.words().rotations(word));
         }
     }
     taken

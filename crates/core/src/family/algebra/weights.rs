@@ -15,13 +15,13 @@ use crate::family::kernels::count_distances;
 use crate::family::krawtchouk::krawtchouk;
 
 /// Largest number of dimensions of a weighed code or dual: a second or two.
-const MOST_DIMENSIONS: u32 = 30;
+const MAX_DIMENSIONS: u32 = 30;
 
 /// Returns the number of words of each weight, 0 to `length`; `None` if neither the code nor its dual is small
 /// enough.
 pub fn weights(code: &Span, length: u32) -> Option<Vec<u128>> {
     let other = length - code.dimension();
-    if code.dimension().min(other) > MOST_DIMENSIONS {
+    if code.dimension().min(other) > MAX_DIMENSIONS {
         return None;
     }
     if code.dimension() <= other {

@@ -53,7 +53,7 @@ impl Family {
 
 /// Computes the bounds for tags of `b` cells.
 pub fn bounds_of_cells(kind: GridKind, b: u32, distance: u32) -> Bounds {
-    let turns = u64::from(kind.turns());
+    let rotations = u64::from(kind.rotations());
     let packed = 2f64.powi(b as i32) / ball(b, distance.saturating_sub(1) / 2);
     let plain = delsarte(b, (distance..=b).collect());
     let even = |length: u32| delsarte(length, (distance..=length).filter(|i| i % 2 == 0).collect());
@@ -65,8 +65,8 @@ pub fn bounds_of_cells(kind: GridKind, b: u32, distance: u32) -> Bounds {
     // The number of all words, or one less if it exceeds a machine word; at distance 1 they are a code.
     let all = 1u64.checked_shl(b).unwrap_or(u64::MAX);
     Bounds {
-        linear_programming: best.min(all) / turns,
-        sphere_packing: packed as u64 / turns,
+        linear_programming: best.min(all) / rotations,
+        sphere_packing: packed as u64 / rotations,
         found_none: distance > 1 && best >= all,
     }
 }

@@ -37,7 +37,7 @@ pub struct Certificate {
 
 impl Certificate {
     /// Returns whether every checked claim of the family holds.
-    pub fn holds(&self) -> bool {
+    pub fn is_valid(&self) -> bool {
         self.failures.is_empty()
     }
 }
@@ -51,7 +51,7 @@ impl Certificate {
 /// use deltille_core::family::{Family, certify};
 ///
 /// let certificate = certify(&Family::shipped("delTag16h5")?);
-/// assert!(certificate.holds());
+/// assert!(certificate.is_valid());
 /// # Ok::<(), deltille_core::family::FamilyError>(())
 /// ```
 pub fn certify(family: &Family) -> Certificate {
@@ -88,7 +88,7 @@ pub fn certify(family: &Family) -> Certificate {
             return certificate;
         }
         // Single tags have almost no distance; patches do: `places::distances`.
-        Construction::Places => return certificate,
+        Construction::Positions => return certificate,
         Construction::Imported { .. } => {
             certificate.unchecked = "where the codes come from".to_owned();
             return certificate;
@@ -235,12 +235,12 @@ fn admits(cells: &TagCells, screen: &Screen, family: &Family, code: u64) -> bool
 
 fn closest_pair(cells: &TagCells, codes: &[u64], distance: u32) -> [u32; 2] {
     for (i, &code) in codes.iter().enumerate() {
-        let turns = std::iter::successors(Some(code), |&word| Some(cells.rotate(word)));
-        let turns: Vec<u64> = turns.take(usize::from(cells.kind().turns())).collect();
-        if turns[1..].iter().any(|turn| (code ^ turn).count_ones() == distance) {
+        let rotations = std::iter::successors(Some(code), |&word| Some(cells.rotate(word)));
+        let rotations: Vec<u64> = rotations.take(usize::from(cells.kind().rotations())).collect();
+        if rotations[1..].iter().any(|turn| (code ^ turn).count_ones() == distance) {
             return [i as u32; 2];
         }
-        let near = |&other: &u64| turns.iter().any(|t| (t ^ other).count_ones() == distance);
+        let near = |&other: &u64| rotations.iter().any(|t| (t ^ other).count_ones() == distance);
         if let Some(j) = codes[..i].iter().position(near) {
             return [j as u32, i as u32];
         }

@@ -28,7 +28,7 @@ impl Confusion {
     /// to be compared pair by pair, or its tags identify a position only together.
     pub fn between(of: &Family, other: &Family) -> Option<Self> {
         let alike = (of.kind(), of.dimension()) == (other.kind(), other.dimension());
-        let fits = |family: &Family| family.len() <= PAIRS_COUNTED && !family.is_of_places();
+        let fits = |family: &Family| family.len() <= PAIRS_COUNTED && !family.is_position_family();
         if !alike || !fits(of) || !fits(other) {
             return None;
         }

@@ -141,7 +141,7 @@ impl Family {
     /// # Ok::<(), deltille_core::family::FamilyError>(())
     /// ```
     pub fn distance_without(&self, hidden: HiddenCells) -> Option<u32> {
-        let known = self.kind() == GridKind::Deltille && !self.is_of_places();
+        let known = self.kind() == GridKind::Deltille && !self.is_position_family();
         known.then(|| least_seen(&self.cells(), self.codes(), hidden))
     }
 }
@@ -149,8 +149,8 @@ impl Family {
 /// Returns the minimum distance of two words, codes in any rotation, in the visible cells.
 pub(in crate::family) fn least_seen(cells: &TagCells, codes: &[u64], hidden: HiddenCells) -> u32 {
     let (masks, count) = (hidden.masks(cells.dimension()), hidden.count(cells.dimension()));
-    let turns = |&code: &u64| [code, cells.rotate(code), cells.rotate(cells.rotate(code))];
-    let turned: Vec<u64> = codes.iter().flat_map(turns).collect();
+    let rotations = |&code: &u64| [code, cells.rotate(code), cells.rotate(cells.rotate(code))];
+    let turned: Vec<u64> = codes.iter().flat_map(rotations).collect();
     let least = AtomicU32::new(cells.dimension().bits() - count);
     codes.par_iter().enumerate().for_each(|(i, &code)| {
         // One of its own rotations suffices, as hidden cells may be anywhere.

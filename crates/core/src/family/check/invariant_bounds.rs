@@ -41,7 +41,7 @@ mod tests {
             let dimension = Dimension::from_bits(bits).unwrap();
             let words = TagWords::new(dimension);
             let even = (0..=dimension.mask()).filter(|word| word.count_ones() % 2 == 0);
-            let moved = even.filter(|&word| words.turn(word) != word).count() as u64;
+            let moved = even.filter(|&word| words.rotate(word) != word).count() as u64;
             assert_eq!(invariant_bound(dimension, 2), Some(moved / 3));
         }
     }

@@ -78,14 +78,14 @@ impl NaturalWords {
     }
 
     /// Returns the probability that a bordered triangle contains a word.
-    pub fn chance(&self, word: u64) -> f64 {
+    pub fn probability(&self, word: u64) -> f64 {
         let shown = parts(self.free).map(|part| self.words.differing_pairs(word | part));
         shown.map(|pairs| self.chances[pairs as usize]).sum()
     }
 
     /// Returns the probability that it contains a word within `errors` cells of a code in one of its rotations;
     /// enumerates all such words.
-    pub fn chance_near(&self, code: u64, errors: u32) -> f64 {
+    pub fn probability_near(&self, code: u64, errors: u32) -> f64 {
         (0..=errors).map(|radius| self.sphere(code, radius)).sum()
     }
 
@@ -93,7 +93,7 @@ impl NaturalWords {
     fn sphere(&self, code: u64, radius: u32) -> f64 {
         let bits = self.words.dimension().bits();
         let used = subsets(bits, radius).filter(|flips| flips & self.free == 0);
-        used.map(|flips| self.chance(code ^ flips)).sum()
+        used.map(|flips| self.probability(code ^ flips)).sum()
     }
 
     /// Returns ln Σ P(w) exp Σ l s(w) over all words w, with the half log-odds l that cells are white and s = ±1 for
@@ -155,8 +155,9 @@ impl NaturalWords {
                     self.sphere(code, radius)
                 } else {
                     let drawn = (share * all * step as f64).ceil() as u32;
-                    let of_drawn =
-                        |_| self.chance(code ^ drawn_subset(bits, self.free, radius, &mut random));
+                    let of_drawn = |_| {
+                        self.probability(code ^ drawn_subset(bits, self.free, radius, &mut random))
+                    };
                     (0..drawn).map(of_drawn).sum::<f64>() * all / f64::from(drawn)
                 };
                 *sum += 3.0 * step as f64 * chance;
@@ -172,7 +173,7 @@ impl Family {
     /// [`Self::false_positive_rates`] assumes fair coin tosses. Above some 100,000 words, the words near the codes
     /// are sampled, always in the same way; the rates are then accurate to 10 %.
     pub fn natural_false_positive_rates(&self) -> Option<Vec<f64>> {
-        if self.kind() != GridKind::Deltille || self.is_of_places() {
+        if self.kind() != GridKind::Deltille || self.is_position_family() {
             return None;
         }
         let words = NaturalWords::new(self.dimension()).with_free(self.free_cells());
@@ -250,7 +251,7 @@ mod tests {
             assert_eq!(rates.len(), 3);
             for (errors, rate) in (0..).zip(rates) {
                 let taken = (0..1u64 << 16).filter(|&word| decoder.decode(word, errors).is_some());
-                let sum: f64 = taken.map(|word| natural.chance(word)).sum();
+                let sum: f64 = taken.map(|word| natural.probability(word)).sum();
                 assert!((rate - sum).abs() < 1e-9 * sum, "{name}, {errors}: {rate}, {sum}");
             }
         }
@@ -268,7 +269,7 @@ mod tests {
                 let of = |word: u64| -> f64 {
                     let sign = |bit: u32| if word >> bit & 1 == 1 { 1.0 } else { -1.0 };
                     let sum: f64 = (0..bits).map(|b| sign(b) * f64::from(odds[b as usize])).sum();
-                    natural.chance(word) * sum.exp()
+                    natural.probability(word) * sum.exp()
                 };
                 let all: f64 = (0..1 << bits).map(of).sum();
                 let result = natural.log_likelihood(&odds);
@@ -287,7 +288,7 @@ mod tests {
         let natural = NaturalWords::new(family.dimension());
         let rates = family.natural_false_positive_rates().unwrap();
         let exact: f64 =
-            family.codes().iter().map(|&code| 3.0 * natural.chance_near(code, 4)).sum();
+            family.codes().iter().map(|&code| 3.0 * natural.probability_near(code, 4)).sum();
         assert!((rates[4] / exact - 1.0).abs() < 0.02, "{} and {exact}", rates[4]);
     }
 

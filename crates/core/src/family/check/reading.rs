@@ -41,7 +41,7 @@ impl Family {
             });
             apart.sum()
         };
-        let words = f64::from(self.kind.turns()) * self.len() as f64;
+        let words = f64::from(self.kind.rotations()) * self.len() as f64;
         let of_pairs = self.histogram.iter().map(|(&distance, &pairs)| {
             // Either of the two may be mistaken for the other.
             2.0 * pairs as f64 / words * misread(distance)
@@ -68,7 +68,7 @@ mod tests {
                     let Some(found) = decoder.decode(code ^ errors, family.correctable()) else {
                         continue;
                     };
-                    let is_misread = (found.id, found.turns) != (id, 0);
+                    let is_misread = (found.id, found.rotations) != (id, 0);
                     counts[errors.count_ones() as usize][usize::from(is_misread)] += 1;
                 }
             }

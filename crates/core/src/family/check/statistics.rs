@@ -17,9 +17,10 @@ pub fn distance_histogram(
     codes: &[u64],
 ) -> BTreeMap<u32, u64> {
     let words = TagWords::of(kind, dimension);
-    let n = usize::from(kind.turns());
-    let turns = |&code: &u64| std::iter::successors(Some(code), |&word| Some(words.turn(word)));
-    let turned: Vec<u64> = codes.iter().flat_map(|code| turns(code).take(n)).collect();
+    let n = usize::from(kind.rotations());
+    let rotations =
+        |&code: &u64| std::iter::successors(Some(code), |&word| Some(words.rotate(word)));
+    let turned: Vec<u64> = codes.iter().flat_map(|code| rotations(code).take(n)).collect();
     let counts = codes
         .par_iter()
         .enumerate()
@@ -46,9 +47,12 @@ pub(in crate::family) fn cross_distances(
     others: &[u64],
 ) -> BTreeMap<u32, u64> {
     let words = TagWords::of(kind, dimension);
-    let turns = |&code: &u64| std::iter::successors(Some(code), |&word| Some(words.turn(word)));
-    let turned: Vec<u64> =
-        others.iter().flat_map(|code| turns(code).take(usize::from(kind.turns()))).collect();
+    let rotations =
+        |&code: &u64| std::iter::successors(Some(code), |&word| Some(words.rotate(word)));
+    let turned: Vec<u64> = others
+        .iter()
+        .flat_map(|code| rotations(code).take(usize::from(kind.rotations())))
+        .collect();
     let counts = codes
         .par_iter()
         .fold(
@@ -73,7 +77,7 @@ fn sum_of(mut sum: [u64; 65], counts: [u64; 65]) -> [u64; 65] {
 pub fn false_positive_rates(kind: GridKind, cells: u32, distance: u32, codes: usize) -> Vec<f64> {
     let b = cells;
     let correctable = distance.saturating_sub(1) / 2;
-    let words = f64::from(kind.turns()) * codes as f64 / 2f64.powi(b as i32);
+    let words = f64::from(kind.rotations()) * codes as f64 / 2f64.powi(b as i32);
     (0..=correctable).map(|t| words * ball(b, t)).collect()
 }
 

@@ -57,7 +57,7 @@ impl TagWords {
 
     /// Returns the word read after the tag was rotated counterclockwise by 120° or 90°.
     #[inline]
-    pub fn turn(&self, word: u64) -> u64 {
+    pub fn rotate(&self, word: u64) -> u64 {
         self.turned
             .iter()
             .enumerate()
@@ -66,17 +66,17 @@ impl TagWords {
 
     /// Returns the words of a triangular tag after zero, one and two counterclockwise rotations by 120°.
     #[inline]
-    pub fn turns(&self, word: u64) -> [u64; 3] {
-        let once = self.turn(word);
-        [word, once, self.turn(once)]
+    pub fn rotations(&self, word: u64) -> [u64; 3] {
+        let once = self.rotate(word);
+        [word, once, self.rotate(once)]
     }
 
     /// Returns the smallest of the words of all rotations, which is independent of the tag's rotation.
     #[inline]
     pub fn canonical(&self, word: u64) -> u64 {
         let (mut least, mut turned) = (word, word);
-        for _ in 1..self.kind.turns() {
-            turned = self.turn(turned);
+        for _ in 1..self.kind.rotations() {
+            turned = self.rotate(turned);
             least = least.min(turned);
         }
         least
@@ -84,8 +84,8 @@ impl TagWords {
 
     /// Returns the distance from a word to its own rotations (both are equal).
     #[inline]
-    pub fn turn_distance(&self, word: u64) -> u32 {
-        (word ^ self.turn(word)).count_ones()
+    pub fn rotation_distance(&self, word: u64) -> u32 {
+        (word ^ self.rotate(word)).count_ones()
     }
 
     /// Returns the number of pairs of edge-adjacent cells that differ.
@@ -101,7 +101,7 @@ impl TagWords {
 
     /// Returns the smallest distance between any rotation of `a` and any rotation of `b`.
     pub fn distance(&self, a: u64, b: u64) -> u32 {
-        let turned = self.turns(b).map(|b| (a ^ b).count_ones());
+        let turned = self.rotations(b).map(|b| (a ^ b).count_ones());
         turned[0].min(turned[1]).min(turned[2])
     }
 
@@ -123,7 +123,7 @@ mod tests {
             let dimension = Dimension::from_bits(rows * rows).unwrap();
             let (cells, words) = (TagCells::new(dimension), TagWords::new(dimension));
             let word = word & dimension.mask();
-            prop_assert_eq!(words.turn(word), cells.rotate(word));
+            prop_assert_eq!(words.rotate(word), cells.rotate(word));
             let differing = cells.neighbours().iter()
                 .filter(|&&[a, b]| word >> a & 1 != word >> b & 1).count();
             prop_assert_eq!(words.differing_pairs(word), differing as u32);
@@ -133,8 +133,8 @@ mod tests {
         fn distance_ignores_rotations(rows in 3..=8u32, a: u64, b: u64) {
             let words = TagWords::new(Dimension::from_bits(rows * rows).unwrap());
             let (a, b) = (a & words.dimension().mask(), b & words.dimension().mask());
-            prop_assert_eq!(words.distance(a, b), words.distance(b, words.turn(a)));
-            prop_assert_eq!(words.canonical(a), words.canonical(words.turn(a)));
+            prop_assert_eq!(words.distance(a, b), words.distance(b, words.rotate(a)));
+            prop_assert_eq!(words.canonical(a), words.canonical(words.rotate(a)));
         }
     }
 }

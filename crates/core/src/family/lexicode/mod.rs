@@ -24,7 +24,7 @@ pub const STEP: u64 = 982_451_653;
 /// Number of candidates in the first chunk; small, because there are no codes yet to filter against.
 const FIRST_CHUNK: u64 = 1 << 10;
 /// Maximum number of candidates in a chunk: a fraction of a second of work.
-const LARGEST_CHUNK: u64 = 1 << 21;
+const MAX_CHUNK: u64 = 1 << 21;
 
 /// Parameters of a lexicode.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,7 +97,7 @@ impl Lexicode {
         let sweeps = Sweep::suits(self.dimension.bits())
             && self.step % 2 == 1
             && self.candidates > FIRST_CANDIDATES
-            && self.distance > LEAST_DISTANCE;
+            && self.distance > MIN_DISTANCE;
         if sweeps && screen.is_robust() {
             let problem = "too many words remain open for a lexicode of this many bits: use `best`";
             return Err(FamilyError::field("robust", problem));
@@ -148,7 +148,7 @@ impl Lexicode {
                 }
             }
             control.tell(to, self.candidates, kept.codes.len());
-            (from, chunk) = (to, (2 * chunk).min(LARGEST_CHUNK));
+            (from, chunk) = (to, (2 * chunk).min(MAX_CHUNK));
         }
         if saved < count {
             checkpoint.candidates_done = count;
@@ -199,12 +199,12 @@ impl Lexicode {
         // excludes the others.
         let mut in_order: Vec<u64> = open
             .par_iter()
-            .filter_map(|&word| screen.words().turns(word).map(number).into_iter().min())
+            .filter_map(|&word| screen.words().rotations(word).map(number).into_iter().min())
             .filter(|&number| number < self.candidates)
             .collect();
         in_order.par_sort_unstable();
         in_order.dedup();
-        for chunk in in_order.chunks(LARGEST_CHUNK as usize / 64) {
+        for chunk in in_order.chunks(MAX_CHUNK as usize / 64) {
             control.check()?;
             let known = kept.turned.len();
             let left: Vec<u64> = chunk
@@ -248,7 +248,7 @@ impl Lexicode {
 const FIRST_CANDIDATES: u64 = 1 << 27;
 
 /// Largest distance at which the first codes leave too many words open to list them.
-const LEAST_DISTANCE: u32 = 7;
+const MIN_DISTANCE: u32 = 7;
 
 /// Number of candidates tried between two checkpoints: some seconds of work, and some kilobytes of file.
 const CHECKPOINT_CANDIDATES: u64 = 1 << 23;
@@ -281,7 +281,7 @@ struct Kept<'a> {
 
 impl<'a> Kept<'a> {
     fn of(codes: Vec<u64>, screen: &'a Screen) -> Self {
-        let turned = codes.iter().flat_map(|&code| screen.words().turns(code)).collect();
+        let turned = codes.iter().flat_map(|&code| screen.words().rotations(code)).collect();
         Self { codes, turned, screen }
     }
 
@@ -292,7 +292,7 @@ impl<'a> Kept<'a> {
 
     fn push(&mut self, word: u64) {
         self.codes.push(word);
-        self.turned.extend(self.screen.words().turns(word));
+        self.turned.extend(self.screen.words().rotations(word));
     }
 }
 

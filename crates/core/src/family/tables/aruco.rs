@@ -84,7 +84,7 @@ fn codes(name: &str, side: u32, len: usize) -> Result<Vec<u64>, FamilyError> {
     if let Some(bits) = name.strip_prefix("DICT_APRILTAG_") {
         let family = Family::shipped(&format!("aprilTag{bits}"))?;
         let words = TagWords::of(family.kind(), family.dimension());
-        return Ok(family.codes().iter().map(|&code| words.turn(words.turn(code))).collect());
+        return Ok(family.codes().iter().map(|&code| words.rotate(words.rotate(code))).collect());
     }
     let table = match side {
         4 => include_str!("../../../families/aruco/4x4.txt"),
@@ -103,11 +103,12 @@ mod tests {
     /// Computes the smallest distance between any two words of different markers or rotations, by comparing all.
     fn least_distance(family: &Family) -> u32 {
         let words = TagWords::of(family.kind(), family.dimension());
-        let turns =
-            |code: u64| std::iter::successors(Some(code), |&word| Some(words.turn(word))).take(4);
+        let rotations =
+            |code: u64| std::iter::successors(Some(code), |&word| Some(words.rotate(word))).take(4);
         let between = |(i, &code): (usize, &u64)| {
-            let others = family.codes()[..i].iter().flat_map(|&other| turns(other));
-            let least = others.chain(turns(code).skip(1)).map(|word| (code ^ word).count_ones());
+            let others = family.codes()[..i].iter().flat_map(|&other| rotations(other));
+            let least =
+                others.chain(rotations(code).skip(1)).map(|word| (code ^ word).count_ones());
             least.min().unwrap()
         };
         family.codes().iter().enumerate().map(between).min().unwrap()

@@ -40,8 +40,9 @@ pub enum Construction {
         /// Moves in each round.
         steps: u64,
     },
-    /// Places on boards ([`crate::family::places`]).
-    Places,
+    /// Positions on boards ([`crate::family::positions`]).
+    #[serde(alias = "places")]
+    Positions,
     /// Codes from another source.
     Imported {
         /// Description of the source.
@@ -86,7 +87,7 @@ pub(in crate::family) fn from_json(json: &str) -> Result<Family, FamilyError> {
         return Err(FamilyError::Schema { found: schema });
     }
     let file: FamilyFile = serde_json::from_str(json)?;
-    if file.construction == Construction::Places {
+    if file.construction == Construction::Positions {
         // Position codes are computed and not listed.
         let known = Family::places();
         if (&file.name, &file.fingerprint) != (&known.name, &known.fingerprint) {
@@ -146,7 +147,7 @@ pub(in crate::family) fn from_json(json: &str) -> Result<Family, FamilyError> {
 
 pub(in crate::family) fn to_json(family: &Family) -> String {
     let words = TagWords::of(family.kind, family.dimension);
-    let listed = if family.is_of_places() { &[] } else { family.codes() };
+    let listed = if family.is_position_family() { &[] } else { family.codes() };
     let file = FamilyFile {
         schema: SCHEMA.to_owned(),
         name: family.name.clone(),

@@ -44,7 +44,7 @@ impl Family {
     pub fn extending(self, older: &Family) -> Result<Self, FamilyError> {
         let tags =
             |family: &Self| (family.kind, family.dimension, family.distance, family.rules.free);
-        if tags(&self) != tags(older) || older.is_of_places() {
+        if tags(&self) != tags(older) || older.is_position_family() {
             let (bits, distance) = (older.dimension.bits(), older.distance);
             let free =
                 older.rules.free.map_or(String::new(), |free| format!(", {} free", free.name()));
@@ -134,7 +134,7 @@ mod tests {
         assert_eq!(third.codes_under(second.fingerprint()), Some(10));
         assert_eq!(third.codes_under(third.fingerprint()), Some(34));
         assert_eq!(third.codes_under("0123456789abcdef"), None);
-        assert!(certify(&third).holds());
+        assert!(certify(&third).is_valid());
         assert_eq!(Family::from_json(&third.to_json()).unwrap(), third);
         // Adding nothing is not growth, and codes that are missing cannot be kept.
         let same = of(&codes).extending(&of(&codes)).unwrap();

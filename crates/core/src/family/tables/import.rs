@@ -60,7 +60,7 @@ pub enum ImportError {
     FamilyFile,
     /// A tag is rotationally symmetric.
     #[error("code {id} is rotationally symmetric, so its orientation is ambiguous")]
-    OwnTurn {
+    RotationallySymmetric {
         /// Index of the code.
         id: usize,
     },
@@ -127,11 +127,12 @@ pub fn import(text: &str, spec: &ImportSpec) -> Result<Family, ImportError> {
     let found = histogram.keys().next().copied().unwrap_or(bits);
     let words = TagWords::of(kind, dimension);
     let is_own_turn = |&code: &u64| {
-        let turns = std::iter::successors(Some(words.turn(code)), |&word| Some(words.turn(word)));
-        turns.take(usize::from(kind.turns()) - 1).any(|turned| turned == code)
+        let rotations =
+            std::iter::successors(Some(words.rotate(code)), |&word| Some(words.rotate(word)));
+        rotations.take(usize::from(kind.rotations()) - 1).any(|turned| turned == code)
     };
     if fit && let Some(id) = codes.iter().position(is_own_turn) {
-        return Err(ImportError::OwnTurn { id });
+        return Err(ImportError::RotationallySymmetric { id });
     }
     if let Some(claimed) = spec.distance.filter(|&claimed| fit && claimed > found && found > 0) {
         return Err(ImportError::Distance { found, claimed });

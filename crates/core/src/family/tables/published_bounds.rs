@@ -60,11 +60,11 @@ pub fn published_bounds(cells: &TagCells, distance: u32) -> Option<PublishedBoun
     let odd = distance % 2;
     let key = (bits + odd, distance + odd);
     let known = TABLE.iter().find(|(length, even, ..)| (*length, *even) == key);
-    let turns = u64::from(GridKind::turns(cells.kind()));
+    let rotations = u64::from(GridKind::rotations(cells.kind()));
     known.map(|&(.., known_words, most_words)| PublishedBounds {
         known_words,
         most_words,
-        most_tags: most_words / turns,
+        most_tags: most_words / rotations,
     })
 }
 

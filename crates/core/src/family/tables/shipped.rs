@@ -1,7 +1,7 @@
 use std::borrow::Cow;
 
 use super::aruco::dictionary;
-use crate::family::places;
+use crate::family::positions;
 use crate::lattice::GridKind;
 
 /// Properties of a family without its codes. A program in a browser fetches codes only when it needs them, so names
@@ -109,7 +109,7 @@ pub(in crate::family) fn json(name: &str) -> Option<&'static str> {
         "delTag25h9" => include_str!("../../../families/delTag25h9.json"),
         "delTag36h9" => include_str!("../../../families/delTag36h9.json"),
         "delTag36h11" => include_str!("../../../families/delTag36h11.json"),
-        places::NAME => include_str!("../../../families/dense9.json"),
+        positions::NAME => include_str!("../../../families/dense9.json"),
         "aprilTag16h5" => include_str!("../../../families/aprilTag16h5.json"),
         "aprilTag25h9" => include_str!("../../../families/aprilTag25h9.json"),
         "aprilTag36h11" => include_str!("../../../families/aprilTag36h11.json"),
@@ -127,7 +127,7 @@ fn whole(name: &str) -> Cow<'_, str> {
 /// Returns the full name of a shipped family or OpenCV dictionary; does not load any codes.
 pub(crate) fn shipped_name(called: &str) -> Option<Cow<'_, str>> {
     let name = whole(called);
-    if name == places::NAME || shipped_families().any(|family| family.name == name) {
+    if name == positions::NAME || shipped_families().any(|family| family.name == name) {
         return Some(name);
     }
     dictionary(called).map(|(name, _)| name.into())

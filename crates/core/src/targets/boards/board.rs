@@ -219,8 +219,8 @@ mod tests {
 
     /// Also covers smaller boards.
     #[test]
-    fn place_codes_are_unique_up_to_256_rows_and_columns() {
-        use crate::family::places::{are_different, id};
+    fn position_codes_are_unique_up_to_256_rows_and_columns() {
+        use crate::family::positions::{are_different, id};
         for (rows, cols) in
             [(256, 256), (256, 30), (30, 257), (257, 257), (300, 40), (20, 258), (500, 500)]
         {

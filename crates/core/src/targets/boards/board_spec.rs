@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::tag_spec::{LEAST_DENSE_TILES, MOST_ROWS};
+use super::tag_spec::{MAX_ROWS, MIN_DENSE_TILES};
 use crate::lattice::GridKind;
 use crate::setting::Setting::{
     BoardBoardId, BoardBoards, BoardCols, BoardEdgeMm, BoardRows, BoardTags, BoardTwoSidedMm,
@@ -12,10 +12,10 @@ use crate::targets::length::format_mm;
 use crate::targets::{TagSpec, TagsIn, TargetError};
 
 /// Range of rows and of columns: two rows of two corners enclose one tile.
-pub const SIDES: std::ops::RangeInclusive<u32> = 2..=MOST_ROWS;
+pub const SIDES: std::ops::RangeInclusive<u32> = 2..=MAX_ROWS;
 
 /// Maximum number of corners of all boards together: their description takes 100 MB of text.
-const MOST_CORNERS: u64 = 1_000_000;
+const MAX_CORNERS: u64 = 1_000_000;
 
 /// Returns the fewest corners of an untagged board, as the detector requires of grids without a confirming tag. They
 /// form a hexagon of triangles, or four squares. Random texture may contain one or two quads that pass for tiles, but
@@ -72,7 +72,7 @@ fn is_deltille(kind: &GridKind) -> bool {
 
 impl BoardSpec {
     /// Tile edge of the published board, mm; it fits A4 with 10 × 11 corners.
-    pub const USUAL_EDGE_MM: f64 = 20.0;
+    pub const DEFAULT_EDGE_MM: f64 = 20.0;
 
     /// Creates one deltille board with tags and the given numbers of rows and columns of corners.
     pub fn deltille(rows: u32, cols: u32, edge_mm: f64) -> Self {
@@ -129,7 +129,7 @@ impl BoardSpec {
         self.check_sides()?;
         for (setting, value) in [(BoardRows, self.rows), (BoardCols, self.cols)] {
             if !SIDES.contains(&value) {
-                let problem = format!("{value} is not between 2 and {MOST_ROWS}");
+                let problem = format!("{value} is not between 2 and {MAX_ROWS}");
                 return Err(TargetError::invalid(setting, problem));
             }
         }
@@ -137,15 +137,15 @@ impl BoardSpec {
             let problem = format!("{} is not between 1 mm and 1000 mm", format_mm(self.edge_mm));
             return Err(TargetError::invalid(BoardEdgeMm, problem));
         }
-        if !(1..=MOST_ROWS).contains(&self.boards) {
-            let problem = format!("{} is not between 1 and {MOST_ROWS}", self.boards);
+        if !(1..=MAX_ROWS).contains(&self.boards) {
+            let problem = format!("{} is not between 1 and {MAX_ROWS}", self.boards);
             return Err(TargetError::invalid(BoardBoards, problem));
         }
         let corners =
             [self.rows, self.cols, self.panel_count()].into_iter().map(u64::from).product::<u64>();
-        if corners > MOST_CORNERS {
+        if corners > MAX_CORNERS {
             let problem =
-                format!("{corners} corners exceed the maximum of {MOST_CORNERS} per target");
+                format!("{corners} corners exceed the maximum of {MAX_CORNERS} per target");
             return Err(TargetError::invalid(BoardBoards, problem));
         }
         if self.board_id.checked_add(self.panel_count()).is_none() {
@@ -180,9 +180,9 @@ impl BoardSpec {
                 if tags.is_dense() && self.grid == GridKind::Deltille {
                     let boards = self.board_id..self.board_id + self.panel_count();
                     let (rows, cols) = (self.rows, self.cols);
-                    if (rows - 1) * (cols - 1) < LEAST_DENSE_TILES {
+                    if (rows - 1) * (cols - 1) < MIN_DENSE_TILES {
                         let problem = format!(
-                            "{rows} × {cols} corners enclose fewer than {LEAST_DENSE_TILES} tiles, too few to \
+                            "{rows} × {cols} corners enclose fewer than {MIN_DENSE_TILES} tiles, too few to \
                 identify a position: use more corners, or tags of another {TagFamily}"
                         );
                         return Err(TargetError::invalid(BoardRows, problem));

@@ -19,4 +19,4 @@ pub use board_spec::{BoardSpec, SIDES, least_untagged_corners};
 pub use charuco::CharucoSpec;
 pub use circles::CirclesSpec;
 pub use tag_sheet::TagSheetSpec;
-pub use tag_spec::{BORDER_BITS, MOST_ROWS, TagSpec};
+pub use tag_spec::{BORDER_BITS, MAX_ROWS, TagSpec};

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::family::places;
+use crate::family::positions;
 use crate::lattice::{GridKind, Vertex};
 use crate::quantity;
 use crate::setting::Setting::{self, TagBorderBits, TagFirstId, TagHoleMm, TagSpacing, TagTagsIn};
@@ -10,16 +10,16 @@ use crate::targets::{TagPlacement, TagsIn, TargetError};
 
 /// Maximum number of rows or columns of a board: more than the largest paper fits at the finest printed edge, and few
 /// enough to avoid overflow.
-pub const MOST_ROWS: u32 = 500;
+pub const MAX_ROWS: u32 = 500;
 
 /// Smallest hole in a tag, mm: for a thin pin.
-const LEAST_HOLE_MM: f64 = 0.5;
+const MIN_HOLE_MM: f64 = 0.5;
 
 /// Fewest tiles of a board of position codes: three by four identify their position even if some are hidden.
-pub(super) const LEAST_DENSE_TILES: u32 = 12;
+pub(super) const MIN_DENSE_TILES: u32 = 12;
 
 /// Least border of a square tag, bit-widths: that of an AprilTag.
-const LEAST_SQUARE_BORDER_BITS: f64 = 1.0;
+const MIN_SQUARE_BORDER_BITS: f64 = 1.0;
 
 /// Range of a tag's border, bit-widths. The border separates the code from the white around the tile. With half a bit
 /// the detector misses some corners of a clean print; from 0.6 bits on it finds all.
@@ -29,7 +29,7 @@ pub const BORDER_BITS: std::ops::RangeInclusive<f64> = 0.6..=10.0;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TagSpec {
-    /// Family name, or path of a family file. With [`places`] every tile has a tag, whose id follows from the board
+    /// Family name, or path of a family file. With [`positions`] every tile has a tag, whose id follows from the board
     /// id and the position.
     pub family: String,
     /// Id of the first tag; the others follow by row, then column, board after board. It is 0 for position codes.
@@ -71,14 +71,14 @@ impl TagSpec {
     /// Returns a position code in every tile of a deltille grid, with the usual border. From 2 px per cell on, corners
     /// are as precise as without codes.
     pub fn dense() -> Self {
-        Self { family: places::NAME.to_owned(), spacing: 1, ..Self::default() }
+        Self { family: positions::NAME.to_owned(), spacing: 1, ..Self::default() }
     }
 
     /// Returns the usual tags of a tiling: the default ones, or those of the named family.
     pub fn usual(grid: GridKind, family: Option<&str>, tags_in: TagsIn) -> Self {
         let usual = match grid {
             GridKind::Checker => Self::for_squares(tags_in),
-            GridKind::Deltille if family == Some(places::NAME) => Self::dense(),
+            GridKind::Deltille if family == Some(positions::NAME) => Self::dense(),
             GridKind::Deltille => Self::default(),
         };
         let family = family.map_or(usual.family, str::to_owned);
@@ -87,7 +87,7 @@ impl TagSpec {
 
     /// Returns whether every tile has a position code.
     pub fn is_dense(&self) -> bool {
-        self.family == places::NAME
+        self.family == positions::NAME
     }
 
     /// Returns the tags in the given tiles of panel `panel`, with ids from `first` on for ordinary families.
@@ -95,7 +95,7 @@ impl TagSpec {
         let tiles = tiles.iter().zip(0..);
         let of_tile = |(tile, i): (&Vertex, u32)| TagPlacement {
             id: match self.is_dense() {
-                true => places::id(panel, *tile),
+                true => positions::id(panel, *tile),
                 // No family is large enough for ids to overflow, but a spec may ask for it.
                 false => first.saturating_add(i),
             },
@@ -114,21 +114,21 @@ impl TagSpec {
         size: Setting,
         [rows, cols]: [u32; 2],
     ) -> Result<(), TargetError> {
-        let last = places::BOARDS - 1;
-        if panels.end > places::BOARDS {
+        let last = positions::BOARDS - 1;
+        if panels.end > positions::BOARDS {
             let problem = format!(
                 "boards {} to {} are needed, but the last id of {} is {last}: lower the id, or make fewer boards",
                 panels.start,
                 panels.end - 1,
-                places::NAME
+                positions::NAME
             );
             return Err(TargetError::invalid(ids, problem));
         }
-        if !places::are_different(rows, cols) {
+        if !positions::are_different(rows, cols) {
             let problem = format!(
                 "{rows} rows of {cols} tiles are too many for {}, whose codes repeat after 256 edges: \
                  make the board smaller",
-                places::NAME
+                positions::NAME
             );
             return Err(TargetError::invalid(size, problem));
         }
@@ -156,7 +156,7 @@ impl TagSpec {
             spacing: 2,
             border_bits: match tags_in {
                 TagsIn::Black => 2.0,
-                TagsIn::White => LEAST_SQUARE_BORDER_BITS,
+                TagsIn::White => MIN_SQUARE_BORDER_BITS,
             },
             tags_in,
             ..Self::default()
@@ -171,7 +171,7 @@ impl TagSpec {
             let problem = "deltille boards can only have tags in black tiles";
             return Err(TargetError::invalid(TagTagsIn, problem));
         }
-        let least = LEAST_SQUARE_BORDER_BITS;
+        let least = MIN_SQUARE_BORDER_BITS;
         if grid == GridKind::Checker && self.border_bits < least {
             let problem = format!(
                 "{} is too narrow: a square tag needs a border of at least {least} bit-width",
@@ -179,8 +179,8 @@ impl TagSpec {
             );
             return Err(TargetError::invalid(TagBorderBits, problem));
         }
-        if !(1..=MOST_ROWS).contains(&self.spacing) {
-            let problem = format!("{} is not between 1 and {MOST_ROWS}", self.spacing);
+        if !(1..=MAX_ROWS).contains(&self.spacing) {
+            let problem = format!("{} is not between 1 and {MAX_ROWS}", self.spacing);
             return Err(TargetError::invalid(TagSpacing, problem));
         }
         if !BORDER_BITS.contains(&self.border_bits) {
@@ -192,8 +192,8 @@ impl TagSpec {
             Some(_) if grid == GridKind::Checker => {
                 refused("square tags have no free cells for a hole: use a deltille board or solid")
             }
-            Some(mm) if mm.is_nan() || mm < LEAST_HOLE_MM => {
-                refused(&format!("{mm} mm is less than the minimum of {LEAST_HOLE_MM} mm"))
+            Some(mm) if mm.is_nan() || mm < MIN_HOLE_MM => {
+                refused(&format!("{mm} mm is less than the minimum of {MIN_HOLE_MM} mm"))
             }
             _ => Ok(()),
         }

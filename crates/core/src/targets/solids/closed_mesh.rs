@@ -20,10 +20,10 @@ pub const NEAR_EQUILATERAL: f64 = 0.15;
 const WELD: f64 = 1e-6;
 
 /// Least height of a face relative to its longest edge; a flatter face counts as having no area.
-const LEAST_HEIGHT: f64 = 1e-4;
+const MIN_HEIGHT: f64 = 1e-4;
 
 /// Least volume of a mesh relative to the cube of its extent; a smaller one counts as flat.
-const LEAST_VOLUME: f64 = 1e-6;
+const MIN_VOLUME: f64 = 1e-6;
 
 /// Largest distance of a vertex from the plane of its face, relative to the mesh's extent: 0.05 mm on a solid of half
 /// a metre, the tolerance of a manufactured one.
@@ -31,7 +31,7 @@ const FLAT: f64 = 1e-4;
 
 /// Sine of the smallest exterior angle at a corner of a face of four or more, 0.6°. Below it, the two sides count as
 /// one line.
-const LEAST_TURN: f64 = 0.01;
+const MIN_ROTATION: f64 = 0.01;
 
 /// Largest coordinate, in the unit of the list.
 const FARTHEST: f64 = 1e9;
@@ -179,7 +179,7 @@ impl ClosedMesh {
         mesh.check_edges()?;
         mesh.check_vertices()?;
         let volume = mesh.volume();
-        if volume.abs() < LEAST_VOLUME * mesh.extent().powi(3) {
+        if volume.abs() < MIN_VOLUME * mesh.extent().powi(3) {
             return Err(Flat);
         }
         if volume < 0.0 {
@@ -216,7 +216,7 @@ impl ClosedMesh {
             while let Some(&face) = group.get(next) {
                 next += 1;
                 for &other in &beside[face] {
-                    let is_level = normals[first].cross(normals[other]).length() < LEAST_TURN
+                    let is_level = normals[first].cross(normals[other]).length() < MIN_ROTATION
                         && normals[first].dot(normals[other]) > 0.0;
                     if is_level && !is_seen[other] {
                         is_seen[other] = true;
@@ -235,7 +235,7 @@ impl ClosedMesh {
         let is_straight = |face: &[usize], i: usize| {
             let at = |i: usize| self.vertices[face[i % face.len()]];
             let before = (at(i) - at(i + face.len() - 1)).normalize_or_zero();
-            before.cross((at(i + 1) - at(i)).normalize_or_zero()).length() < LEAST_TURN
+            before.cross((at(i + 1) - at(i)).normalize_or_zero()).length() < MIN_ROTATION
         };
         let mut is_corner = vec![false; self.vertices.len()];
         for face in &outlines {
@@ -261,12 +261,12 @@ impl ClosedMesh {
         .take(next.len() + 1)
         .collect();
         let whole = outline.len() == next.len() && next.len() == rim.count();
-        let turns = |i: usize| {
+        let rotations = |i: usize| {
             let at = |i: usize| self.vertices[outline[i % outline.len()]];
             let side = |i: usize| (at(i + 1) - at(i)).normalize_or_zero();
             side(i).cross(side(i + 1)).dot(normal(&self.corners(faces[0])).normalize_or_zero())
         };
-        (whole && (0..outline.len()).all(|i| turns(i) > -LEAST_TURN)).then_some(outline)
+        (whole && (0..outline.len()).all(|i| rotations(i) > -MIN_ROTATION)).then_some(outline)
     }
 
     /// Returns the vertices, in the unit of the list.
@@ -317,7 +317,7 @@ impl ClosedMesh {
         let lengths = self.lengths(face);
         let longest = lengths.iter().copied().fold(0.0, f64::max);
         let area = normal(&self.corners(face)).length();
-        area > LEAST_HEIGHT * longest * longest && lengths.iter().all(|&length| length > 0.0)
+        area > MIN_HEIGHT * longest * longest && lengths.iter().all(|&length| length > 0.0)
     }
 
     fn is_flat(&self, face: usize, within: f64) -> bool {
@@ -332,14 +332,14 @@ impl ClosedMesh {
         let count = corners.len();
         let outwards = normal(&corners).normalize_or_zero();
         let side = |i: usize| (corners[(i + 1) % count] - corners[i % count]).normalize_or_zero();
-        let turns = (0..count).map(|i| {
+        let rotations = (0..count).map(|i| {
             let (before, behind) = (side(i), side(i + 1));
             let sine = before.cross(behind).dot(outwards);
             (sine, angle(sine, before.dot(behind)))
         });
-        let turns: Vec<(f64, f64)> = turns.collect();
-        let around: f64 = turns.iter().map(|(_, turn)| turn).sum();
-        count == 3 || turns.iter().all(|(sine, _)| *sine > LEAST_TURN) && around < 1.5 * TAU
+        let rotations: Vec<(f64, f64)> = rotations.collect();
+        let around: f64 = rotations.iter().map(|(_, turn)| turn).sum();
+        count == 3 || rotations.iter().all(|(sine, _)| *sine > MIN_ROTATION) && around < 1.5 * TAU
     }
 
     /// Returns the sum of the signed volumes of the tetrahedra over a vertex.

@@ -19,7 +19,7 @@ use glam::{DMat3, DVec2, DVec3};
 use crate::angles::direction;
 use crate::lattice::{GridKind, ROW_HEIGHT, Vertex};
 use crate::targets::boards::board::board_vertices;
-use crate::targets::boards::tag_spec::MOST_ROWS;
+use crate::targets::boards::tag_spec::MAX_ROWS;
 use crate::targets::{Incircle, Outline, PanelPose, Polyhedron};
 
 /// Cosine of the smallest angle of a rectangular face: angles may be 1° off. Along a side of 150 mm that takes 2.6
@@ -301,7 +301,7 @@ fn corners_within(polygon: &[DVec2], origin: DVec2, edge_mm: f64) -> Vec<Vertex>
             .map(of)
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
         // A board may not have more; a larger request makes the whole board too large.
-        let most = most.min(least + 2.0 * f64::from(MOST_ROWS));
+        let most = most.min(least + 2.0 * f64::from(MAX_ROWS));
         least.floor() as i32..=most.ceil() as i32
     };
     let rows = span(|p| p.y / ROW_HEIGHT);

@@ -29,7 +29,7 @@ use crate::targets::{ClosedMesh, Polyhedron, TargetError};
 const FOOT_MM: f64 = 0.8;
 
 /// Least inradius of a window, mm: room for fingers and for removing support material.
-const LEAST_WINDOW_MM: f64 = 3.0;
+const MIN_WINDOW_MM: f64 = 3.0;
 
 /// Clearance around a panel in its seat, mm: the tolerance of printers and cutters.
 const PLAY_MM: f64 = 0.15;
@@ -107,12 +107,12 @@ impl Skeleton {
         let faces = || (0..solid.faces.len()).map(|face| solid.corners_mm(face));
         let inradius =
             faces().map(|corners| Incircle::of(&corners).radius).fold(f64::MAX, f64::min);
-        if window + LEAST_WINDOW_MM > inradius {
+        if window + MIN_WINDOW_MM > inradius {
             let problem = format!(
                 "seats and ledges take {:.1} mm from the edges, but the smallest face has only \
                  {inradius:.1} mm from edge to centre: use thinner {SkeletonWallMm} or panels, or \
                  a larger {SolidEdgeMm}",
-                window + LEAST_WINDOW_MM
+                window + MIN_WINDOW_MM
             );
             return Err(TargetError::invalid(SolidSkeleton, problem));
         }

@@ -10,7 +10,7 @@ use crate::lattice::{GridKind, Vertex};
 use crate::setting::Setting::{SolidEdgeMm, SolidMarginMm, SolidTiles};
 use crate::targets::boards::board::tagged_tiles;
 use crate::targets::boards::capacity::{TagSettings, check_family, wider_spacing};
-use crate::targets::boards::tag_spec::MOST_ROWS;
+use crate::targets::boards::tag_spec::MAX_ROWS;
 use crate::targets::length::format_mm;
 use crate::targets::{
     Corner, Face, FaceBoard, FamilyRef, Incircle, Panel, Polyhedron, Skeleton, SolidShape,
@@ -19,7 +19,7 @@ use crate::targets::{
 
 /// Least blank margin along the edges of a panel in a skeleton, mm: room for the number of its face, and for
 /// inaccurate cuts.
-const LEAST_PANEL_MARGIN_MM: f64 = 3.0;
+const MIN_PANEL_MARGIN_MM: f64 = 3.0;
 
 impl SolidSpec {
     /// Returns the solid.
@@ -53,12 +53,12 @@ impl SolidSpec {
                 let face =
                     solid.face_with_squares(index, self.tiles, self.margin_mm, square_edge_mm);
                 let face = face
-                    .filter(|face| face.tile_edge_mm >= Self::FINEST_TILE_MM)
+                    .filter(|face| face.tile_edge_mm >= Self::MIN_TILE_MM)
                     .ok_or_else(|| self.too_fine(&solid))?;
                 let most = face.board.matrix().into_iter().max().unwrap_or_default();
-                if most > MOST_ROWS {
+                if most > MAX_ROWS {
                     let problem = format!(
-                        "face {index} would have {most} corners in a row, more than {MOST_ROWS}: use fewer tiles, or sides of more similar length"
+                        "face {index} would have {most} corners in a row, more than {MAX_ROWS}: use fewer tiles, or sides of more similar length"
                     );
                     return Err(TargetError::invalid(SolidTiles, problem));
                 }
@@ -100,7 +100,7 @@ impl SolidSpec {
         let usual = self.usual_margin_mm();
         let Some(skeleton) = &self.skeleton else { return Ok(usual) };
         let inset_mm = Skeleton::new(&self.polyhedron(), skeleton)?.panel_inset_mm;
-        Ok(usual.max(self.margin_around_mm(inset_mm + LEAST_PANEL_MARGIN_MM).ceil()))
+        Ok(usual.max(self.margin_around_mm(inset_mm + MIN_PANEL_MARGIN_MM).ceil()))
     }
 
     /// Returns the distance of the edges of panels from those of their faces, mm: 0 without a skeleton.
@@ -138,16 +138,16 @@ impl SolidSpec {
         let small = 1e-6 * self.edge_mm;
         let needed = edge_of(0.0).zip(edge_of(small)).map(|(bare, less)| {
             let taken = (bare - less) / small * self.margin_mm;
-            (Self::FINEST_TILE_MM + taken) / bare * self.edge_mm
+            (Self::MIN_TILE_MM + taken) / bare * self.edge_mm
         });
-        let least = needed.fold(Self::LEAST_EDGE_MM, f64::max).ceil();
+        let least = needed.fold(Self::MIN_EDGE_MM, f64::max).ceil();
         let problem = format!(
             "{} leaves no room for {} tiles of at least {} per side within margins of {}: use \
              {SolidEdgeMm} of at least {least} mm, fewer {SolidTiles}, or a smaller \
              {SolidMarginMm}",
             format_mm(self.edge_mm),
             self.tiles,
-            format_mm(Self::FINEST_TILE_MM),
+            format_mm(Self::MIN_TILE_MM),
             format_mm(self.margin_mm),
         );
         TargetError::invalid(SolidEdgeMm, problem)
@@ -209,7 +209,7 @@ fn family_of(
             let faces = SolidSpec { tiles, ..spec.clone() }.faces();
             faces.is_ok_and(|faces| tag_count(&faces, kind, tags) <= available)
         };
-        let fewer = (SolidSpec::FEWEST_TILES..spec.tiles)
+        let fewer = (SolidSpec::MIN_TILES..spec.tiles)
             .rev()
             .find(has_enough)
             .map(|tiles| format!("use at most {tiles} {SolidTiles}"));

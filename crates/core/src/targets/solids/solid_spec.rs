@@ -21,7 +21,7 @@ pub const FACE_TILES: std::ops::RangeInclusive<u32> = 6..=200;
 
 /// Least margin of a face with white tiles on black, mm: it contains the black around the tiles, and the numbers of
 /// the face outside that.
-const LEAST_INVERTED_MARGIN_MM: f64 = 5.0;
+const MIN_INVERTED_MARGIN_MM: f64 = 5.0;
 
 /// Usual margins of a face, mm: room to fold and glue; the second is for white tiles on black.
 const MARGIN_MM: f64 = 5.0;
@@ -36,10 +36,10 @@ const RIM_PART: f64 = 0.4;
 const FARTHEST_MM: f64 = 1e5;
 
 /// Maximum number of triangles of all faces: meshes count their corners in 16 bits.
-const MOST_TRIANGLES: usize = 20_000;
+const MAX_TRIANGLES: usize = 20_000;
 
 /// Maximum number of faces of a solid.
-const MOST_FACES: u32 = 10_000;
+const MAX_FACES: u32 = 10_000;
 
 /// A solid whose faces carry boards with tags: triangles of deltille tiles on triangular faces, checkerboards
 /// on rectangular ones.
@@ -141,13 +141,13 @@ impl SolidShape {
 
 impl SolidSpec {
     /// Shortest edge, mm.
-    pub const LEAST_EDGE_MM: f64 = *SOLID_EDGE_MM.start();
+    pub const MIN_EDGE_MM: f64 = *SOLID_EDGE_MM.start();
 
     /// Fewest tiles along a side of a face.
-    pub const FEWEST_TILES: u32 = *FACE_TILES.start();
+    pub const MIN_TILES: u32 = *FACE_TILES.start();
 
     /// Finest edge of a tile, mm: what [`BoardSpec`](crate::targets::BoardSpec) allows.
-    pub const FINEST_TILE_MM: f64 = *EDGE_MM.start();
+    pub const MIN_TILE_MM: f64 = *EDGE_MM.start();
 
     /// Creates a solid with edges of 150 mm, or a cuboid or mesh in its own size. It has ten tiles a side (the tags
     /// of a triangle are then symmetric), or eight squares. A blank margin of 5 mm along its edges leaves room to
@@ -222,17 +222,16 @@ impl SolidSpec {
             }
         }
         if let SolidShape::Mesh(mesh) = &self.shape
-            && mesh.faces().len() > MOST_FACES as usize
+            && mesh.faces().len() > MAX_FACES as usize
         {
-            let problem =
-                format!("{} faces exceed the maximum of {MOST_FACES}", mesh.faces().len());
+            let problem = format!("{} faces exceed the maximum of {MAX_FACES}", mesh.faces().len());
             return Err(TargetError::invalid(SolidShapeMesh, problem));
         }
         if let SolidShape::Mesh(mesh) = &self.shape {
             let triangles: usize = mesh.faces().iter().map(|face| face.len() - 2).sum();
-            if triangles > MOST_TRIANGLES {
+            if triangles > MAX_TRIANGLES {
                 let problem = format!(
-                    "its faces consist of {triangles} triangles, which exceeds the maximum of {MOST_TRIANGLES}"
+                    "its faces consist of {triangles} triangles, which exceeds the maximum of {MAX_TRIANGLES}"
                 );
                 return Err(TargetError::invalid(SolidShapeMesh, problem));
             }
@@ -258,16 +257,16 @@ impl SolidSpec {
             let problem = format!("{} is not a valid margin of a face", format_mm(self.margin_mm));
             return Err(TargetError::invalid(SolidMarginMm, problem));
         }
-        if self.board_id.checked_add(MOST_FACES).is_none() {
+        if self.board_id.checked_add(MAX_FACES).is_none() {
             let problem =
                 format!("{} is too large: it leaves no ids for the following faces", self.board_id);
             return Err(TargetError::invalid(SolidBoardId, problem));
         }
-        if self.inverted && self.margin_mm < LEAST_INVERTED_MARGIN_MM {
+        if self.inverted && self.margin_mm < MIN_INVERTED_MARGIN_MM {
             let problem = format!(
                 "{} leaves no room for a black field around white tiles: use at least {}",
                 format_mm(self.margin_mm),
-                format_mm(LEAST_INVERTED_MARGIN_MM)
+                format_mm(MIN_INVERTED_MARGIN_MM)
             );
             return Err(TargetError::invalid(SolidMarginMm, problem));
         }

@@ -29,12 +29,12 @@ impl TagLabeller {
         let is_elsewhere = |index: usize| {
             let (tile, shown) = (sight.readings[index].tile, &sight.shown[index]);
             let is_here = |tag: &LabelTag| {
-                self.words.turns() * tag.code + turns_of(placement.map, tile) == shown.word
+                self.words.rotations() * tag.code + turns_of(placement.map, tile) == shown.word
             };
             let is_predicted =
                 tags.get(&placement.map.apply_tile(tile)).is_some_and(is_here) && !shown.is_foreign;
             let is_of_panel = || {
-                let mut places = self.places[shown.word / self.words.turns()].iter();
+                let mut places = self.places[shown.word / self.words.rotations()].iter();
                 places.any(|&(panel, _)| panel == placement.panel)
             };
             shown.code[0] > CLEARLY_OTHER && !is_predicted && (shown.is_foreign || is_of_panel())

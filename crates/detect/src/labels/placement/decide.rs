@@ -24,10 +24,10 @@ const MIN_LEAD: f64 = 6.0 * std::f64::consts::LN_2;
 const BEYOND_DOUBT: f64 = 40.0;
 
 /// Maximum number of placements that are evaluated, best proposals first.
-const MOST_PROPOSALS: usize = 64;
+const MAX_PROPOSALS: usize = 64;
 
 /// Maximum number of tiles that are read in a grid: with so many, the evidence is conclusive or worthless.
-pub(super) const MOST_TILES: usize = 2000;
+pub(super) const MAX_TILES: usize = 2000;
 
 /// Time to read a tile from the image, in comparisons of a tile with one word.
 const READING_COST: usize = 1000;
@@ -56,7 +56,7 @@ impl TagLabeller {
         let mut sights = Vec::new();
         for way in self.ways_to_read() {
             let cost = READING_COST + 2 * self.words.len();
-            let most = (budget.0 / cost).min(MOST_TILES);
+            let most = (budget.0 / cost).min(MAX_TILES);
             if most == 0 {
                 evidence.is_cut_short = true;
                 return evidence;
@@ -193,7 +193,7 @@ impl TagLabeller {
     /// Returns the placements that single tiles propose, sorted by the evidence of these tiles. The sum omits evidence
     /// against a placement, because it only selects those that are judged.
     fn proposals(&self, sights: &[Sight]) -> Vec<Placement> {
-        let turns = self.words.turns();
+        let rotations = self.words.rotations();
         let mut sums: HashMap<(usize, usize, LatticeMap), f64> = HashMap::new();
         for (index, sight) in sights.iter().enumerate() {
             for (reading, evidence) in sight.readings.iter().zip(&sight.evidence) {
@@ -201,10 +201,10 @@ impl TagLabeller {
                     if f64::from(evidence) < PROPOSING {
                         continue;
                     }
-                    for &(panel, tile) in &self.places[word / turns] {
+                    for &(panel, tile) in &self.places[word / rotations] {
                         let Way { reader, inverted, .. } = self.panels[panel].way();
                         if (reader, inverted) == (sight.way.reader, sight.way.inverted) {
-                            let map = panel_from_grid(reading.tile, tile, (word % turns) as u8);
+                            let map = panel_from_grid(reading.tile, tile, (word % rotations) as u8);
                             *sums.entry((index, panel, map)).or_default() += f64::from(evidence);
                         }
                     }
@@ -218,7 +218,7 @@ impl TagLabeller {
         let key = |p: &Placement| (p.sight, p.panel, p.map);
         proposals
             .sort_unstable_by(|a, b| b.evidence.total_cmp(&a.evidence).then(key(a).cmp(&key(b))));
-        proposals.truncate(MOST_PROPOSALS);
+        proposals.truncate(MAX_PROPOSALS);
         proposals
     }
 
@@ -243,9 +243,9 @@ impl TagLabeller {
         let sight = &sights[placement.sight];
         let mut tags: Vec<DecodedTag> = self
             .expected(placement)
-            .filter_map(|(tile, LabelTag { id, code }, turns)| {
+            .filter_map(|(tile, LabelTag { id, code }, rotations)| {
                 let reading = *sight.index.get(&tile)?;
-                let word = self.words.turns() * code + turns;
+                let word = self.words.rotations() * code + rotations;
                 let errors = (self.words.word(word) ^ sight.readings[reading].word()).count_ones();
                 let Vertex { row, col } = placement.map.apply_tile(tile).anchor;
                 let family = self.family.clone();

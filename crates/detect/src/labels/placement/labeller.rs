@@ -187,17 +187,18 @@ impl TagLabeller {
         (!ids.is_empty()).then(|| Self {
             readers,
             family: family.name().to_owned(),
-            is_dense: family.is_of_places(),
-            decoder: (!family.is_of_places()).then(decoder),
-            natural: (family.kind() == GridKind::Deltille && !family.is_of_places())
+            is_dense: family.is_position_family(),
+            decoder: (!family.is_position_family()).then(decoder),
+            natural: (family.kind() == GridKind::Deltille && !family.is_position_family())
                 .then(|| NaturalWords::new(family.dimension())),
             sure_errors: family.correctable() / 2,
-            family_words: family.len() * usize::from(family.kind().turns()),
+            family_words: family.len() * usize::from(family.kind().rotations()),
             max_errors,
             words: TargetWords::new(family, ids),
             panels,
             panels_abut,
-            ways: usize::from(family.kind().turns()) * places.iter().map(Vec::len).sum::<usize>(),
+            ways: usize::from(family.kind().rotations())
+                * places.iter().map(Vec::len).sum::<usize>(),
             places,
         })
     }

@@ -60,9 +60,9 @@ impl TagLabeller {
     /// Returns the evidence for a placement over natural images, nats, if a single tag supports it.
     pub(super) fn over_nature(&self, sight: &Sight, placement: &Placement) -> Option<f64> {
         let natural = self.natural.as_ref()?;
-        let mut speaking = self.expected(placement).filter_map(|(tile, tag, turns)| {
+        let mut speaking = self.expected(placement).filter_map(|(tile, tag, rotations)| {
             let reading = *sight.index.get(&tile)?;
-            let word = self.words.turns() * tag.code + turns;
+            let word = self.words.rotations() * tag.code + rotations;
             (f64::from(sight.evidence[reading][word]) > PROPOSING).then_some((reading, word))
         });
         let (Some((reading, word)), None) = (speaking.next(), speaking.next()) else { return None };
@@ -110,7 +110,7 @@ impl TagLabeller {
         let (tile, shown) = (sight.readings[index].tile, &sight.shown[index]);
         let on_panel = placement.map.apply_tile(tile);
         if let Some(tag) = panel.tags.get(&on_panel) {
-            let word = self.words.turns() * tag.code + turns_of(placement.map, tile);
+            let word = self.words.rotations() * tag.code + turns_of(placement.map, tile);
             // The boards for comparison have the best code other than the predicted one.
             let but = usize::from(shown.word == word);
             let evidence = sight.evidence[index][word].into();
@@ -142,8 +142,8 @@ impl TagLabeller {
         self.panels[placement.panel].tags.iter().map(move |(&tile, &tag)| {
             let on_grid = grid_from_panel.apply_tile(tile);
             let a = grid_from_panel.apply(tile.frame()[0]);
-            let turns = on_grid.vertices().position(|v| v == a).unwrap_or(0);
-            (on_grid, tag, turns)
+            let rotations = on_grid.vertices().position(|v| v == a).unwrap_or(0);
+            (on_grid, tag, rotations)
         })
     }
 }

@@ -18,13 +18,13 @@ pub(crate) fn panel_vertices(panel: &Panel) -> BTreeSet<Vertex> {
 }
 
 /// Returns the motion that takes the grid tile to the panel's `tile`. The tag in it is rotated counter-clockwise against
-/// the grid by `turns` steps of 120° or 90°.
-pub(crate) fn panel_from_grid(on_grid: Tile, tile: Tile, turns: u8) -> LatticeMap {
+/// the grid by `rotations` steps of 120° or 90°.
+pub(crate) fn panel_from_grid(on_grid: Tile, tile: Tile, rotations: u8) -> LatticeMap {
     // The tag's lower-left vertex lies on vertex `turns` of the grid tile. Its lower edge points along step 2·turns,
     // rotated by 180° on an inverted tile. On a square it points along step `turns`.
     let kind = tile.kind();
-    let steps = kind.steps().len() as i32 / i32::from(kind.turns());
+    let steps = kind.steps().len() as i32 / i32::from(kind.rotations());
     let half_turn = if on_grid.orientation == Orientation::Inverted { 3 } else { 0 };
-    let from = on_grid.vertices().nth(usize::from(turns)).unwrap_or(on_grid.anchor);
-    LatticeMap::taking(kind, from, tile.anchor, -(steps * i32::from(turns) + half_turn))
+    let from = on_grid.vertices().nth(usize::from(rotations)).unwrap_or(on_grid.anchor);
+    LatticeMap::taking(kind, from, tile.anchor, -(steps * i32::from(rotations) + half_turn))
 }

@@ -123,10 +123,10 @@ fn is_word(reading: &Reading) -> bool {
     /// At least one cell in so many must have the other colour, because an untagged tile has one colour except for
     /// dirt. Of 16 random cells, fewer have it once in 240 times; of 25, once in 1100. With 3, no dirt counts as a tag,
     /// but one tag in 5 of 16 cells is missed.
-    const LEAST_OTHER: usize = 6;
+    const MIN_OTHER: usize = 6;
     // Free cells contain no information.
     let n = reading.half_odds.iter().filter(|odds| odds.abs() > 0.0).count();
     let sure = |sign: f32| reading.half_odds.iter().filter(|&&odds| sign * odds > SURE).count();
     let (white, black) = (sure(1.0), sure(-1.0));
-    SURE_CELLS[1] * (white + black) >= SURE_CELLS[0] * n && LEAST_OTHER * white.min(black) >= n
+    SURE_CELLS[1] * (white + black) >= SURE_CELLS[0] * n && MIN_OTHER * white.min(black) >= n
 }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::decide::MOST_TILES;
+use super::decide::MAX_TILES;
 use super::labeller::{Labelled, TagEvidence, TagLabeller, Way};
 use super::motion::{panel_from_grid, panel_vertices, turns_of};
 use crate::grid::saddle_grid::{PlacedSaddle, SaddleGrid, mirrored};
@@ -407,7 +407,7 @@ fn noisy_tags(noise: f64, views: u64, words_a_view: usize) -> NoisyTags {
                 (Vertex::new(corner.row, corner.col), placed)
             })
             .collect();
-        let readings = labeller.readers[0].read((&image).into(), &grid, false, MOST_TILES).readings;
+        let readings = labeller.readers[0].read((&image).into(), &grid, false, MAX_TILES).readings;
         let Some(at) = readings.iter().position(|r| r.tile == tile) else {
             continue;
         };

@@ -193,8 +193,9 @@ fn fill<const K: usize, const C: usize, const JOINT: bool>(
 ) {
     let [x, y] = corner.position.as_vec2().to_array();
     // Directions of the edges, in units of the blur across them.
-    let sines: [f32; K] = std::array::from_fn(|k| (look.turns[k].0 * look.sharpness[k]) as f32);
-    let cosines: [f32; K] = std::array::from_fn(|k| (look.turns[k].1 * look.sharpness[k]) as f32);
+    let sines: [f32; K] = std::array::from_fn(|k| (look.rotations[k].0 * look.sharpness[k]) as f32);
+    let cosines: [f32; K] =
+        std::array::from_fn(|k| (look.rotations[k].1 * look.sharpness[k]) as f32);
     let bends: [f32; K] = std::array::from_fn(|k| (corner.bends[k] / look.sharpness[k]) as f32);
     let by_turn: [f32; K] = std::array::from_fn(|k| look.by_turn[k] as f32);
     let by_angle: [f32; K] =

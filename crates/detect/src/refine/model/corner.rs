@@ -25,7 +25,7 @@ pub(super) const ANGLE: usize = 7;
 
 /// Maximum change of the logarithm of the blur in one step. Linear equations contain little information on a blur that
 /// is e times as wide.
-const MOST_LN_BLUR: f64 = 1.0;
+const MAX_LN_BLUR: f64 = 1.0;
 
 /// Minimum blur that can be distinguished within a window, px: that of a pixel's box. The maximum is half the radius.
 pub(super) const MIN_BLUR_PX: f64 = 0.2;
@@ -77,7 +77,7 @@ impl<const K: usize> Corner<K> {
     pub(super) fn moved(&self, step: &SVector<f64, PARAMS>, radius: usize) -> Option<Self> {
         let mut corner = *self;
         corner.position += DVec2::new(step[X], step[Y]);
-        corner.blur_px = (corner.blur_px * step[LN_BLUR].clamp(-MOST_LN_BLUR, MOST_LN_BLUR).exp())
+        corner.blur_px = (corner.blur_px * step[LN_BLUR].clamp(-MAX_LN_BLUR, MAX_LN_BLUR).exp())
             .max(MIN_BLUR_PX);
         corner.amplitude += step[AMPLITUDE];
         corner.level += step[LEVEL];

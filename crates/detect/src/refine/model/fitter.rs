@@ -28,7 +28,7 @@ const MAX_EVALUATIONS: usize = 25;
 const DAMPING: f64 = 1e-3;
 
 /// Minimum damping later on; a smaller one changes no digit of a step.
-const LEAST_DAMPING: f64 = 1e-6;
+const MIN_DAMPING: f64 = 1e-6;
 
 /// Damping below which a small step means that the minimum is near, not that the damping shortens steps.
 const NEARLY_UNDAMPED: f64 = 0.1;
@@ -165,7 +165,7 @@ impl CornerFitter {
         let start = *start;
         let freedom = (window.count - (ANGLE + K)) as f64;
         let mut corner = start;
-        let mut damping = Damping::from(DAMPING).at_least(LEAST_DAMPING, 0.0);
+        let mut damping = Damping::from(DAMPING).at_least(MIN_DAMPING, 0.0);
         // The piece of the curve is fixed, so that steps account for all that they change. It is renewed after the
         // first step, which finds the light, and after the last.
         let mut toned = start;

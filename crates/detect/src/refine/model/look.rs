@@ -9,7 +9,7 @@ use deltille_core::detection::Piece;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Look<const K: usize> {
     /// Sines and cosines of the angles.
-    pub(super) turns: [(f64, f64); K],
+    pub(super) rotations: [(f64, f64); K],
     /// 1/s_k, 1/px.
     pub(super) sharpness: [f64; K],
     /// ∂ ln s_k/∂θ_k.
@@ -43,9 +43,9 @@ pub(super) struct Look<const K: usize> {
 impl<const K: usize> Look<K> {
     pub(super) fn of(corner: &Corner<K>, optics: &Optics, piece: Piece, limits: [f32; 2]) -> Self {
         let spread = optics.spread(K);
-        let turns = corner.angles.map(f64::sin_cos);
-        let normals = turns.map(|(sin, cos)| [-sin, cos]);
-        let tangents = turns.map(|(sin, cos)| [-cos, -sin]);
+        let rotations = corner.angles.map(f64::sin_cos);
+        let normals = rotations.map(|(sin, cos)| [-sin, cos]);
+        let tangents = rotations.map(|(sin, cos)| [-cos, -sin]);
         let product = |a, b| spread.product(a, b);
         let squares = normals.map(|n| product(n, n));
         let by_turn: [f64; K] =
@@ -79,9 +79,9 @@ impl<const K: usize> Look<K> {
         let by_ink = by_ink(corner, sharpness);
         let displaced = by_ink.map(|by| by * optics.ink);
         let is_inked = displaced.iter().any(|d| *d != 0.0);
-        let triangle = is_inked.then(|| triangle(corner, turns, optics, &spread));
+        let triangle = is_inked.then(|| triangle(corner, rotations, optics, &spread));
         Self {
-            turns,
+            rotations,
             by_astigmatism,
             rho_by_astigmatism,
             sharpness,
@@ -138,23 +138,24 @@ fn by_ink<const K: usize>(corner: &Corner<K>, sharpness: [f64; K]) -> [f64; K] {
 /// sines and cosines of the corner's angles are passed with it.
 fn triangle<const K: usize>(
     corner: &Corner<K>,
-    turns: [(f64, f64); K],
+    rotations: [(f64, f64); K],
     optics: &Optics,
     spread: &Spread,
 ) -> Triangle {
     /// Step in the logarithm of the blur, radians and units of ink: the quotient is accurate to some 1/10 000.
     const STEP: f64 = 1e-4;
     let core = optics.core();
-    let overlap = |blur_px: f64, turns: [(f64, f64); K], ink: f64| {
+    let overlap = |blur_px: f64, rotations: [(f64, f64); K], ink: f64| {
         let core_px = blur_px * core;
-        let normals = turns.map(|(sin, cos)| [-sin, cos]);
+        let normals = rotations.map(|(sin, cos)| [-sin, cos]);
         let product = |a, b| spread.product(a, b);
         let lengths = normals.map(|n| product(n, n).sqrt());
         let rho = product(normals[0], normals[1]) / (lengths[0] * lengths[1]);
         let displaced = by_ink(corner, lengths.map(|l| 1.0 / (core_px * l))).map(|by| by * ink);
         // n₃ as a sum of n₁ and n₂.
-        let sine =
-            |from: usize, to: usize| turns[to].0 * turns[from].1 - turns[to].1 * turns[from].0;
+        let sine = |from: usize, to: usize| {
+            rotations[to].0 * rotations[from].1 - rotations[to].1 * rotations[from].0
+        };
         let a = sine(2, 1) / sine(0, 1) * lengths[0] / lengths[2];
         let b = sine(0, 2) / sine(0, 1) * lengths[1] / lengths[2];
         let c = a * displaced[0] + b * displaced[1] - displaced[2];
@@ -165,13 +166,13 @@ fn triangle<const K: usize>(
         Overlap::between([a, b, c], cov, displaced[0].signum())
     };
     let there = std::array::from_fn(|parameter| match parameter {
-        0 => overlap(corner.blur_px * STEP.exp(), turns, optics.ink),
+        0 => overlap(corner.blur_px * STEP.exp(), rotations, optics.ink),
         1..=3 => {
-            let mut turned = turns;
+            let mut turned = rotations;
             turned[parameter - 1] = (corner.angles[parameter - 1] + STEP).sin_cos();
             overlap(corner.blur_px, turned, optics.ink)
         }
-        _ => overlap(corner.blur_px, turns, optics.ink + STEP),
+        _ => overlap(corner.blur_px, rotations, optics.ink + STEP),
     });
-    Triangle::new(overlap(corner.blur_px, turns, optics.ink), there, STEP)
+    Triangle::new(overlap(corner.blur_px, rotations, optics.ink), there, STEP)
 }

@@ -30,7 +30,7 @@ struct CalibrationFile<'a> {
     spline: Option<SplineGrid>,
     parameters: Vec<ParameterRecord<'a>>,
     correlations: Vec<Vec<f64>>,
-    loose: &'a [String],
+    ill_conditioned: &'a [String],
     #[serde(skip_serializing_if = "Option::is_none")]
     projection: Option<ProjectionRecord>,
     rms_px: f64,
@@ -85,7 +85,7 @@ pub fn write(
         spline: spline(camera),
         parameters: parameters(camera),
         correlations: correlations(camera),
-        loose: &camera.ill_conditioned,
+        ill_conditioned: &camera.ill_conditioned,
         projection: projection(camera),
         rms_px: found.rms_px,
         inlier_rms_px: found.inlier_rms_px(),

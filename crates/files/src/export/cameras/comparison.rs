@@ -28,18 +28,18 @@ struct CameraRecord<'a> {
     rms_px: f64,
     largest_px: f64,
     expected_px: Option<f64>,
-    chance: Option<f64>,
+    p_value: Option<f64>,
     significant: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
     undecided: Option<&'static str>,
     second_from_first: Motion,
     /// For each pixel (x, y) of the first camera, the difference (dx, dy) of the second camera and
     /// the standard deviation per axis.
-    places: Vec<PlaceRecord>,
+    positions: Vec<PositionRecord>,
 }
 
 #[derive(Serialize)]
-struct PlaceRecord {
+struct PositionRecord {
     x: f64,
     y: f64,
     dx: f64,
@@ -54,9 +54,9 @@ struct PlaceRecord {
 struct MotionRecord<'a> {
     from: &'a str,
     to: &'a str,
-    turn_rad: DVec3,
-    moved_mm: DVec3,
-    chance: Option<f64>,
+    rotation_rad: DVec3,
+    translation_mm: DVec3,
+    p_value: Option<f64>,
     significant: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
     undecided: Option<&'static str>,
@@ -72,18 +72,18 @@ pub fn write(names: &[&str], found: &[Comparison], motions: &[CameraMotion]) -> 
         rms_px: found.rms_px,
         largest_px: found.largest_px(),
         expected_px: found.expected_px,
-        chance: found.chance,
+        p_value: found.p_value,
         significant: found.is_significant(),
         undecided: found.why_undecided(),
         second_from_first: Motion::new(&found.second_from_first, None),
-        places: found.places.iter().flatten().map(place).collect(),
+        positions: found.positions.iter().flatten().map(place).collect(),
     });
     let motions = motions.iter().map(|motion| MotionRecord {
         from: &motion.from,
         to: &motion.to,
-        turn_rad: motion.turn_rad,
-        moved_mm: motion.moved_mm,
-        chance: motion.chance,
+        rotation_rad: motion.rotation_rad,
+        translation_mm: motion.translation_mm,
+        p_value: motion.p_value,
         significant: motion.is_significant(),
         undecided: motion.why_undecided(),
     });
@@ -92,8 +92,8 @@ pub fn write(names: &[&str], found: &[Comparison], motions: &[CameraMotion]) -> 
     json::to_text(&file, 4)
 }
 
-fn place(found: &deltille_calibrate::Difference) -> PlaceRecord {
-    PlaceRecord {
+fn place(found: &deltille_calibrate::Difference) -> PositionRecord {
+    PositionRecord {
         x: found.pixel.x,
         y: found.pixel.y,
         dx: found.by.x,

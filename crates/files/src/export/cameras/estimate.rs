@@ -8,8 +8,8 @@ use serde::Serialize;
 
 use super::motion::Motion;
 use deltille_calibrate::{
-    BoardShape, CameraEstimate, ChangedIntrinsic, Coverage, Diagnosis, Estimate, Instead,
-    LackOfFit, LensEnd, PanelRef, Source, TargetMap, ViewEstimate, Words,
+    Alternative, BoardShape, CameraEstimate, ChangedIntrinsic, Coverage, Diagnosis, Estimate,
+    LackOfFit, LensLimit, Messages, PanelRef, Source, TargetMap, ViewEstimate,
 };
 use deltille_core::camera::{Lens, SplineGrid};
 use deltille_core::detection::InkEstimate;
@@ -28,7 +28,7 @@ pub struct Print {
 pub enum Residuals {
     /// Views contain only their number of corners and the RMS residual.
     #[default]
-    LeftOut,
+    Omitted,
     /// Views list all corners.
     Listed,
 }
@@ -147,23 +147,23 @@ pub(in crate::export) struct DiagnosisRecord<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     frames: Option<i32>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    left_out: Option<usize>,
+    excluded: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     all: Option<usize>,
     /// The smallest rotation after which the board looks the same, degrees, and whether only the selected labels fit.
     #[serde(skip_serializing_if = "Option::is_none")]
     degrees: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    sure: Option<bool>,
+    confirmed: Option<bool>,
     /// Parameters of another camera that also explains the views.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     other: BTreeMap<String, f64>,
     /// Radius up to which the lens model is usable, px.
     #[serde(skip_serializing_if = "Option::is_none")]
-    steady_px: Option<f64>,
+    monotonic_px: Option<f64>,
     /// The quantity that was estimated instead of fixed, and the resulting RMS residual.
     #[serde(skip_serializing_if = "Option::is_none")]
-    instead: Option<String>,
+    alternative: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     rms_px_then: Option<f64>,
     /// First view after a change of the camera, the changed intrinsic before and after, and the standard deviation of the
@@ -362,7 +362,7 @@ pub(in crate::export) fn map<'a>(estimate: &'a Estimate, found: &'a TargetMap) -
 
 /// Kinds of diagnoses in files that make a calibration unusable.
 const FAILURES: [&str; 5] =
-    ["foreign_camera", "absurd_fit", "many_left_out", "many_panels_left_out", "changed_camera"];
+    ["wrong_camera", "unusable_fit", "many_excluded", "many_panels_excluded", "changed_camera"];
 
 /// Whether a diagnosis of this kind in a file makes the calibration unusable, as [`Diagnosis::is_failure`] does.
 pub fn is_failure(kind: &str) -> bool {
@@ -375,38 +375,38 @@ pub(in crate::export) fn diagnoses<'a>(
     diagnoses: &'a [Diagnosis],
     print_scale: Option<[f64; 2]>,
 ) -> Vec<DiagnosisRecord<'a>> {
-    let words = Words::new(estimate, print_scale);
+    let words = Messages::new(estimate, print_scale);
     let name = |camera: usize| estimate.camera_name(camera);
     let record = |diagnosis: &'a Diagnosis| {
         let text =
             DiagnosisRecord { text: words.sentence(diagnosis), ..DiagnosisRecord::default() };
         Some(match diagnosis {
-            Diagnosis::ForeignCamera { camera, rms_px } => DiagnosisRecord {
-                kind: "foreign_camera",
+            Diagnosis::WrongCamera { camera, rms_px } => DiagnosisRecord {
+                kind: "wrong_camera",
                 camera: name(*camera),
                 rms_px: Some(*rms_px),
                 ..text
             },
-            Diagnosis::AbsurdFit { camera, rms_px } => DiagnosisRecord {
-                kind: "absurd_fit",
+            Diagnosis::UnusableFit { camera, rms_px } => DiagnosisRecord {
+                kind: "unusable_fit",
                 camera: name(*camera),
                 rms_px: Some(*rms_px),
                 ..text
             },
-            Diagnosis::ManyLeftOut { left_out, all } => DiagnosisRecord {
-                kind: "many_left_out",
-                left_out: Some(*left_out),
+            Diagnosis::ManyExcluded { excluded, all } => DiagnosisRecord {
+                kind: "many_excluded",
+                excluded: Some(*excluded),
                 all: Some(*all),
                 ..text
             },
-            Diagnosis::ManyPanelsLeftOut { left_out, all } => DiagnosisRecord {
-                kind: "many_panels_left_out",
-                left_out: Some(*left_out),
+            Diagnosis::ManyPanelsExcluded { excluded, all } => DiagnosisRecord {
+                kind: "many_panels_excluded",
+                excluded: Some(*excluded),
                 all: Some(*all),
                 ..text
             },
-            Diagnosis::Late { camera, frames } => DiagnosisRecord {
-                kind: "late",
+            Diagnosis::DelayedCamera { camera, frames } => DiagnosisRecord {
+                kind: "delayed_camera",
                 camera: name(*camera),
                 frames: Some(*frames),
                 ..text
@@ -417,14 +417,14 @@ pub(in crate::export) fn diagnoses<'a>(
                 degrees: Some(rotation.degrees),
                 frames: Some(rotation.frames as i32),
                 all: Some(rotation.of),
-                sure: Some(rotation.is_sure),
+                confirmed: Some(rotation.is_confirmed),
                 ..text
             },
-            Diagnosis::LabelsOpen { degrees } => {
-                DiagnosisRecord { kind: "labels_open", degrees: Some(*degrees), ..text }
+            Diagnosis::AmbiguousLabels { degrees } => {
+                DiagnosisRecord { kind: "ambiguous_labels", degrees: Some(*degrees), ..text }
             }
-            Diagnosis::OtherMinimum { camera, other, rms_px } => DiagnosisRecord {
-                kind: "other_minimum",
+            Diagnosis::SecondMinimum { camera, other, rms_px } => DiagnosisRecord {
+                kind: "second_minimum",
                 camera: name(*camera),
                 rms_px_then: Some(*rms_px),
                 other: other.parameter_names().into_iter().zip(other.parameters()).collect(),
@@ -460,22 +460,24 @@ pub(in crate::export) fn diagnoses<'a>(
                 significance: Some(stretch.significance),
                 ..text
             },
-            Diagnosis::LensEnds { camera, end: LensEnd { steady_px, .. } } => DiagnosisRecord {
-                kind: "lens_ends",
-                camera: name(*camera),
-                steady_px: Some(*steady_px),
-                ..text
-            },
+            Diagnosis::NonMonotonicLens { camera, end: LensLimit { monotonic_px, .. } } => {
+                DiagnosisRecord {
+                    kind: "non_monotonic_lens",
+                    camera: name(*camera),
+                    monotonic_px: Some(*monotonic_px),
+                    ..text
+                }
+            }
             Diagnosis::Remedied { camera, remedy } => DiagnosisRecord {
                 kind: "remedy",
                 camera: name(*camera),
                 rms_px: Some(remedy.from_px),
                 rms_px_then: Some(remedy.to_px),
-                instead: Some(match remedy.instead {
-                    Instead::Model(model) => model.to_string(),
-                    Instead::Shape => "board_shape".to_owned(),
-                    Instead::Panels => "panels".to_owned(),
-                    Instead::Camera => "camera".to_owned(),
+                alternative: Some(match remedy.alternative {
+                    Alternative::Model(model) => model.to_string(),
+                    Alternative::Shape => "board_shape".to_owned(),
+                    Alternative::Panels => "panels".to_owned(),
+                    Alternative::Camera => "camera".to_owned(),
                     _ => return None,
                 }),
                 ..text
@@ -521,12 +523,12 @@ mod tests {
         let mut estimate = Estimate::default();
         estimate.cameras = vec![CameraEstimate::given("camera", test_camera())];
         let all = [
-            Diagnosis::ForeignCamera { camera: 0, rms_px: 100.0 },
-            Diagnosis::AbsurdFit { camera: 0, rms_px: 100.0 },
-            Diagnosis::ManyLeftOut { left_out: 5, all: 8 },
-            Diagnosis::ManyPanelsLeftOut { left_out: 5, all: 8 },
+            Diagnosis::WrongCamera { camera: 0, rms_px: 100.0 },
+            Diagnosis::UnusableFit { camera: 0, rms_px: 100.0 },
+            Diagnosis::ManyExcluded { excluded: 5, all: 8 },
+            Diagnosis::ManyPanelsExcluded { excluded: 5, all: 8 },
             Diagnosis::PoorFit { camera: 0, rms_px: 2.0 },
-            Diagnosis::Late { camera: 0, frames: 1 },
+            Diagnosis::DelayedCamera { camera: 0, frames: 1 },
         ];
         for (said, record) in all.iter().zip(diagnoses(&estimate, &all, None)) {
             assert_eq!(is_failure(record.kind), said.is_failure(), "{}", record.kind);

@@ -20,7 +20,7 @@ struct PoseLine<'a> {
     rms_px: f64,
     camera_from_target: Motion,
     #[serde(skip_serializing_if = "is_one")]
-    poses_alike: usize,
+    equivalent_poses: usize,
 }
 
 #[derive(Serialize)]
@@ -52,7 +52,7 @@ pub fn write_line(estimate: &Estimate, view: &ViewEstimate, target: &Target) -> 
         view: &view.name,
         image: &view.image,
         target: &target.name,
-        poses_alike: alike.unwrap_or(1),
+        equivalent_poses: alike.unwrap_or(1),
         corners: view.corners.len(),
         outliers: view.outlier_count(),
         rms_px: view.rms_px,

@@ -73,7 +73,7 @@ struct Camera<'a> {
     spline: Option<SplineGrid>,
     parameters: Vec<ParameterRecord<'a>>,
     correlations: Vec<Vec<f64>>,
-    loose: &'a [String],
+    ill_conditioned: &'a [String],
     #[serde(skip_serializing_if = "Option::is_none")]
     projection: Option<ProjectionRecord>,
     camera_from_rig: Motion,
@@ -175,7 +175,7 @@ fn of_camera<'a>(
         spline: spline(found),
         parameters: parameters(found),
         correlations: correlations(found),
-        loose: &found.ill_conditioned,
+        ill_conditioned: &found.ill_conditioned,
         projection: projection(found),
         camera_from_rig: Motion::new(&found.camera_from_rig, found.pose_sd),
         delay_frames: found.delay,

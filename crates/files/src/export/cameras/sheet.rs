@@ -60,11 +60,11 @@ struct SheetOfFile {
 /// A shape as calibration and rig files store it.
 #[derive(Deserialize)]
 pub(in crate::export) struct StoredShape {
-    #[serde(deserialize_with = "quantity::place_mm::de")]
+    #[serde(deserialize_with = "quantity::position_mm::de")]
     middle_mm: DVec3,
     #[serde(deserialize_with = "quantity::edge_mm::de")]
     reach_mm: f64,
-    #[serde(deserialize_with = "quantity::place_mm::de")]
+    #[serde(deserialize_with = "quantity::position_mm::de")]
     coefficients_mm: [f64; COUNT],
 }
 

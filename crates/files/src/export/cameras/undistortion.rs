@@ -35,9 +35,9 @@ struct View {
     /// Row-major.
     view_from_camera: [f64; 9],
     /// Fraction of its pixels that the camera sees.
-    covered: f64,
+    valid_fraction: f64,
     /// x, y, width and height of the largest rectangle that the camera sees completely.
-    whole_px: [usize; 4],
+    valid_px: [usize; 4],
 }
 
 #[derive(Serialize)]
@@ -69,8 +69,8 @@ impl View {
             horizontal_field_deg: field(camera.width),
             vertical_field_deg: field(camera.height),
             view_from_camera: rows(made),
-            covered: map.covered(),
-            whole_px: map.whole_rectangle(),
+            valid_fraction: map.valid_fraction(),
+            valid_px: map.valid_rectangle(),
         }
     }
 }
@@ -132,7 +132,7 @@ pub fn opencv_pair(made: &Rectification) -> String {
 /// image.
 pub fn maps(map: &PixelMap) -> [Vec<u8>; 2] {
     let of = |index: usize| {
-        let values = map.places().iter().map(move |place| match place[index].is_nan() {
+        let values = map.positions().iter().map(move |place| match place[index].is_nan() {
             true => -1.0,
             false => place[index],
         });

@@ -24,8 +24,8 @@ const COLOURS: [[u8; 3]; 6] =
 /// legible beside their corners.
 const READABLE_EDGE_PX: f64 = 52.0;
 /// Maximum enlargement of a photograph, and the maximum side length after it, px.
-const MOST_ENLARGED: u32 = 8;
-const LARGEST_SIDE_PX: u32 = 4096;
+const MAX_ENLARGED: u32 = 8;
+const MAX_SIDE_PX: u32 = 4096;
 /// Text height, line width and ring radius as fractions of the tile edge.
 const TEXT_EDGES: f64 = 0.17;
 const TAG_TEXT_EDGES: f64 = 0.3;
@@ -136,8 +136,8 @@ fn enlargement(width: u32, height: u32, detection: &Detection) -> u32 {
     let edges = detection.grids.iter().filter_map(Grid::edge_px);
     let shortest = edges.fold(READABLE_EDGE_PX, f64::min);
     let wanted = (READABLE_EDGE_PX / shortest.max(1.0)).ceil() as u32;
-    let possible = (LARGEST_SIDE_PX / width.max(height).max(1)).max(1);
-    wanted.clamp(1, possible.min(MOST_ENLARGED))
+    let possible = (MAX_SIDE_PX / width.max(height).max(1)).max(1);
+    wanted.clamp(1, possible.min(MAX_ENLARGED))
 }
 
 fn background<T: Intensity>(image: &Gray<T>, scale: u32) -> Result<Pixmap, OverlayError> {

@@ -10,7 +10,7 @@
 //! …
 //! ```
 
-use deltille_core::quantity::place_mm;
+use deltille_core::quantity::position_mm;
 use deltille_core::targets::{PanelPose, Target};
 use deltille_core::words::quoted;
 use glam::{DMat3, DVec3};
@@ -69,7 +69,7 @@ pub fn read(text: &str) -> Result<Vec<(u32, PanelPose)>, TpError> {
             };
             rows[row] = DVec3::new(a, b, c);
             translation_mm[row] =
-                place_mm::RANGE.check(t).map_err(|what| fault(at, what.to_string()))?;
+                position_mm::RANGE.check(t).map_err(|what| fault(at, what.to_string()))?;
         }
         let rotation = DMat3::from_cols_array_2d(&rows.map(|row| row.to_array())).transpose();
         let off = rotation * rotation.transpose() - DMat3::IDENTITY;

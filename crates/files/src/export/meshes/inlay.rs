@@ -16,7 +16,7 @@ use rstar::primitives::GeomWithData;
 use rstar::{AABB, RTree};
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
-pub use super::meshing::{INLAY_MM, LEAST_INLAY_MM};
+pub use super::meshing::{INLAY_MM, MIN_INLAY_MM};
 use super::meshing::{MeshError, Meshing};
 use deltille_core::polygon::rectangle;
 use deltille_core::targets::{Panel, Polyhedron, Target, TargetSpec};
@@ -67,7 +67,7 @@ impl InlaidBodies {
     /// reaches through the plate or meets the inlay of another face.
     pub fn new(target: &Target, meshing: Meshing) -> Result<Self, MeshError> {
         let name = target.name.to_string();
-        if meshing.inlay_mm.is_nan() || meshing.inlay_mm < LEAST_INLAY_MM {
+        if meshing.inlay_mm.is_nan() || meshing.inlay_mm < MIN_INLAY_MM {
             return Err(MeshError::ThinInlay(meshing.inlay_mm));
         }
         let [white, black] = match (&target.spec, target.panels.as_slice()) {

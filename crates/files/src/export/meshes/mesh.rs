@@ -3,8 +3,8 @@
 use glam::{DVec2, DVec3};
 
 pub use super::meshing::{
-    LEAST_TEXELS_PER_BIT, LEAST_TEXELS_PER_SQUARE_BIT, MAX_TEXTURE_PX, MeshError, Meshing,
-    PLATE_MM, Resolution, TEXELS_PER_BIT,
+    MAX_TEXTURE_PX, MIN_TEXELS_PER_BIT, MIN_TEXELS_PER_SQUARE_BIT, MeshError, Meshing, PLATE_MM,
+    Resolution, TEXELS_PER_BIT,
 };
 use super::texture::{Finest, Picture, Surface, pictures};
 use crate::export::GENERATOR;
@@ -130,7 +130,7 @@ impl TexturedMesh {
         };
         let cell_mm = smallest_cell_mm(target, target.family().map_err(TargetError::from)?);
         let is_square = target.panels.iter().any(|panel| panel.kind == GridKind::Checker);
-        let needed = if is_square { LEAST_TEXELS_PER_SQUARE_BIT } else { LEAST_TEXELS_PER_BIT };
+        let needed = if is_square { MIN_TEXELS_PER_SQUARE_BIT } else { MIN_TEXELS_PER_BIT };
         let cell = match target.family {
             Some(_) => Finest { name: "tag bit", mm: cell_mm, needed, coarser: TAGS_TOO_FINE },
             None => {

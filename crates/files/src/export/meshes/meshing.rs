@@ -10,7 +10,7 @@ use deltille_layout::artwork::ArtworkError;
 pub const INLAY_MM: f64 = 0.4;
 
 /// Minimum depth of an inlay, mm: no printer has thinner layers.
-pub const LEAST_INLAY_MM: f64 = 0.05;
+pub const MIN_INLAY_MM: f64 = 0.05;
 
 /// Default number of texels along the edge of a cell of a tag, which is sharp in a close view.
 pub const TEXELS_PER_BIT: f64 = 20.0;
@@ -19,10 +19,10 @@ pub const TEXELS_PER_BIT: f64 = 20.0;
 pub const MAX_TEXTURE_PX: u32 = 16_384;
 
 /// Minimum number of texels along the edge of a cell: tags need 2 px per cell, and a camera blurs texels.
-pub const LEAST_TEXELS_PER_BIT: f64 = 4.0;
+pub const MIN_TEXELS_PER_BIT: f64 = 4.0;
 
 /// The same for squares. Their edges run along the rows and columns of texels, and interpolation rounds their ends.
-pub const LEAST_TEXELS_PER_SQUARE_BIT: f64 = 12.0;
+pub const MIN_TEXELS_PER_SQUARE_BIT: f64 = 12.0;
 
 /// Default thickness of a plate, mm.
 pub const PLATE_MM: f64 = 3.0;
@@ -80,7 +80,7 @@ pub enum MeshError {
     #[error("a plate cannot be {0} mm thick: set 0.1 to 1000 mm")]
     Thickness(f64),
     /// An inlay that is thinner than any printed layer.
-    #[error("an inlay cannot be {0} mm deep: set {LEAST_INLAY_MM} mm or more")]
+    #[error("an inlay cannot be {0} mm deep: set {MIN_INLAY_MM} mm or more")]
     ThinInlay(f64),
     /// An inlay that is as deep as the plate, or that meets the inlay of another face.
     #[error("an inlay cannot be {inlay_mm} mm deep here: set less than {most_mm:.2} mm")]

@@ -172,7 +172,7 @@ impl Set<'_> {
         if !filled && longest(&found) <= side {
             return found;
         }
-        for _ in 0..MOST_ATTEMPTS {
+        for _ in 0..MAX_ATTEMPTS {
             let is = longest(&found);
             if is <= side && f64::from(is) > CLOSE * f64::from(side) {
                 break;
@@ -189,7 +189,7 @@ impl Set<'_> {
 const CLOSE: f64 = 0.99;
 
 /// Maximum number of attempts; each reduces the error by the fraction of the side that spaces take up.
-const MOST_ATTEMPTS: usize = 12;
+const MAX_ATTEMPTS: usize = 12;
 
 /// Divides the faces into `count` non-empty runs of about the same area; there are at least `count` faces.
 fn shares(areas: &[f64], count: usize) -> Vec<Range<usize>> {

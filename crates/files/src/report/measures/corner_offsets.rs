@@ -18,13 +18,13 @@ use deltille_calibrate::{CameraEstimate, Estimate, PanelRef, ViewEstimate};
 use deltille_core::camera::{Camera, Pose};
 
 /// Maximum number of corners used, from evenly sampled views: more would not improve the result.
-const MOST_CORNERS: usize = 200_000;
+const MAX_CORNERS: usize = 200_000;
 
 /// Threshold of a significant offset: χ² with two degrees of freedom at p = 0.001.
 pub(in crate::report) const SURE: f64 = 13.8;
 
 /// Minimum number of views of a corner.
-const LEAST_VIEWS: usize = 3;
+const MIN_VIEWS: usize = 3;
 
 /// Statistics of a corner of the target.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +37,7 @@ pub(in crate::report) struct OfCorner {
     /// The least-squares offset d from that position, mm.
     pub move_mm: DVec2,
     /// Whether the offset is significant.
-    pub is_sure: bool,
+    pub is_confirmed: bool,
     /// RMS of its residuals per axis, px.
     pub rms_px: f64,
     pub views: usize,
@@ -56,7 +56,7 @@ struct Sums {
 /// The corners that a camera saw, by panel, row and column. Outliers are excluded, unless a corner is an outlier in most of
 /// its views: then the error is systematic, and all views count.
 pub(in crate::report) fn of_corners(estimate: &Estimate, camera: &CameraEstimate) -> Vec<OfCorner> {
-    let step = camera.corner_count().div_ceil(MOST_CORNERS).max(1);
+    let step = camera.corner_count().div_ceil(MAX_CORNERS).max(1);
     // Sums of the inliers, and of all.
     let mut sums: BTreeMap<(PanelRef, i32, i32), [Sums; 2]> = BTreeMap::new();
     for view in camera.views.iter().step_by(step) {
@@ -81,7 +81,7 @@ pub(in crate::report) fn of_corners(estimate: &Estimate, camera: &CameraEstimate
     let seen = sums.into_iter().map(|(corner, [inliers, all])| {
         (corner, if 2 * inliers.views >= all.views { inliers } else { all })
     });
-    let seen = seen.filter(|(_, sums)| sums.views >= LEAST_VIEWS);
+    let seen = seen.filter(|(_, sums)| sums.views >= MIN_VIEWS);
     let of_corner = |((panel, row, col), sums): ((PanelRef, i32, i32), Sums)| {
         let move_mm = sums.normal.inverse() * sums.right;
         let views = sums.views;
@@ -91,7 +91,7 @@ pub(in crate::report) fn of_corners(estimate: &Estimate, camera: &CameraEstimate
             col,
             at_mm: sums.at_mm / views as f64,
             move_mm,
-            is_sure: sums.right.dot(move_mm) / variance > SURE,
+            is_confirmed: sums.right.dot(move_mm) / variance > SURE,
             rms_px: (sums.squares / (2 * views) as f64).sqrt(),
             views,
         })

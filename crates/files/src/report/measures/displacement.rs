@@ -19,7 +19,7 @@ use deltille_core::camera::Camera;
 const PINHOLE_RAD: f64 = 70.0 / 180.0 * PI;
 
 /// Maximum angle from the axis, rad: no lens sees more.
-const MOST_RAD: f64 = 130.0 / 180.0 * PI;
+const MAX_RAD: f64 = 130.0 / 180.0 * PI;
 
 /// Distance that stands for infinity, mm, and angle from the axis at which the focal length is measured, rad.
 pub(in crate::report) const INFINITY_MM: f64 = 1e9;
@@ -85,7 +85,7 @@ impl Ideal {
         let flat = (pixel - self.centre_px) / self.focal_px;
         let angle = if self.is_pinhole { flat.length().atan() } else { flat.length() };
         let around = flat.try_normalize().unwrap_or(DVec2::ZERO);
-        (angle < MOST_RAD).then(|| (around * angle.sin()).extend(angle.cos()))
+        (angle < MAX_RAD).then(|| (around * angle.sin()).extend(angle.cos()))
     }
 
     /// The projection law, as the axis labels show it.
@@ -102,7 +102,7 @@ impl Ideal {
 pub(in crate::report) fn shown_rad(camera: &Camera, survey: &Survey) -> [f64; 2] {
     let angle = |pixel: DVec2| {
         let ray = camera.unproject(pixel)?;
-        Some(ray.direction.angle_between(DVec3::Z).min(MOST_RAD))
+        Some(ray.direction.angle_between(DVec3::Z).min(MAX_RAD))
     };
     let most = |pixels: Vec<DVec2>| pixels.into_iter().filter_map(angle).fold(0.0, f64::max);
     let DVec2 { x: w, y: h } = survey.size_px;
@@ -126,7 +126,7 @@ pub(in crate::report) fn curve(
     distance_mm: f64,
     widest_rad: f64,
 ) -> Vec<Displacement> {
-    let steady = camera.lens.steady_radius().unwrap_or(f64::INFINITY);
+    let steady = camera.lens.monotonic_radius().unwrap_or(f64::INFINITY);
     let angles = (0..=ANGLES).map(|i| widest_rad * i as f64 / ANGLES as f64);
     let at = |angle_rad: f64| {
         let displacements = (0..AROUND).map(|i| {

@@ -56,13 +56,13 @@ pub struct SurveyedView {
     /// `None` for solids.
     pub tilt_rad: Option<f64>,
     /// Direction in the image in which the tilted board is farther away, rad, from right towards down; `None` for solids.
-    pub away_rad: Option<f64>,
+    pub tilt_direction_rad: Option<f64>,
     /// Distance of the origin of the target from the camera, mm.
     pub distance_mm: f64,
 }
 
 /// Minimum number of inliers for a mean: with fewer, the standard deviation is unreliable.
-const LEAST_IN_CELL: usize = 4;
+const MIN_IN_CELL: usize = 4;
 
 impl Survey {
     /// Computes the statistics of the views of a camera that the calibration used.
@@ -133,7 +133,7 @@ impl Survey {
 
 /// Mean of the residuals of a cell, px, with its standard deviation; `None` if there are too few, or if all are equal.
 fn cell_mean(residuals: &[DVec2]) -> Option<CellMean> {
-    if residuals.len() < LEAST_IN_CELL {
+    if residuals.len() < MIN_IN_CELL {
         return None;
     }
     let n = residuals.len() as f64;
@@ -152,7 +152,7 @@ fn surveyed(camera: &Camera, view: &ViewEstimate, planar: bool) -> SurveyedView 
     let lean = lean(camera, &view.pose, middle).filter(|_| planar);
     SurveyedView {
         tilt_rad: lean.map(|[tilt, _]| tilt),
-        away_rad: lean.map(|[_, away]| away),
+        tilt_direction_rad: lean.map(|[_, away]| away),
         distance_mm: view.pose.translation.length(),
     }
 }
@@ -189,8 +189,9 @@ mod tests {
                 let [tilt, away] = lean(&next.camera, &next.camera_from_target, place).unwrap();
                 assert!((tilt - next.tilt_rad).abs() < 1e-6, "{tilt} {}", next.tilt_rad);
                 if next.tilt_rad > 0.0 {
-                    let off = DVec2::from_angle(away).angle_to(DVec2::from_angle(next.away_rad));
-                    assert!(off.abs() < 0.02, "{away} {}", next.away_rad);
+                    let off = DVec2::from_angle(away)
+                        .angle_to(DVec2::from_angle(next.tilt_direction_rad));
+                    assert!(off.abs() < 0.02, "{away} {}", next.tilt_direction_rad);
                 }
             }
         }

@@ -23,7 +23,7 @@ const WIDEST_RAD: f64 = 110.0 / 180.0 * std::f64::consts::PI;
 const AHEAD_RAD: f64 = 45.0 / 180.0 * std::f64::consts::PI;
 
 /// Minimum number of corners of a line.
-const LEAST_IN_LINE: usize = 3;
+const MIN_IN_LINE: usize = 3;
 
 /// A photograph of a camera and its undistorted version.
 #[derive(Clone, Debug)]
@@ -91,7 +91,7 @@ impl Sample {
         let mut lines: [Vec<[DVec2; 2]>; 2] = Default::default();
         for along_rows in [true, false] {
             for line in lines_of(view, along_rows).into_values() {
-                let ends = line.first().zip(line.last()).filter(|_| line.len() >= LEAST_IN_LINE);
+                let ends = line.first().zip(line.last()).filter(|_| line.len() >= MIN_IN_LINE);
                 let ends = ends.and_then(|(a, b)| Some([seen(a)?, seen(b)?]));
                 let Some([(a, a_new), (b, b_new)]) = ends else { continue };
                 lines[0].push([a, b]);

@@ -39,7 +39,7 @@ pub(in crate::report) fn plot(
         col: corner.col,
         at_mm: corner.at_mm,
         by_mm: corner.move_mm,
-        is_sure: corner.is_sure,
+        is_confirmed: corner.is_confirmed,
         colour: colour(corner.rms_px).to_owned(),
         title: format!(
             "row {}, column {}: rms {:.4} px, ({:.4}, {:.4}) mm, {} views",
@@ -62,7 +62,7 @@ pub(in crate::report) fn plot(
     ));
     axes.foot(FOOT, scales(most_px, &colour, round_down(longest), enlarged * panels.per_mm()));
     let svg = axes.svg(["", ""], "Residuals of each corner of the target");
-    let sure = corners.iter().filter(|corner| corner.is_sure).count();
+    let sure = corners.iter().filter(|corner| corner.is_confirmed).count();
     let caption = format!(
         "Residuals of each target corner over all views. The colour is their rms. Arrows show the offset on the panel that \
          would explain them, enlarged {enlarged} times; {sure} of {} offsets are significant (the others are grey).",

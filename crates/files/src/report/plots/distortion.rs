@@ -118,7 +118,7 @@ pub(in crate::report) fn curve_plot(
 pub(in crate::report) fn grid_plot(found: &CameraEstimate, survey: &Survey) -> (String, String) {
     let camera = &found.camera;
     let ideal = Ideal::of(camera, shown_rad(camera, survey)[1]);
-    let steady = camera.lens.steady_radius().unwrap_or(f64::INFINITY);
+    let steady = camera.lens.monotonic_radius().unwrap_or(f64::INFINITY);
     let warped = |pixel: DVec2| {
         let at = camera.project(INFINITY_MM * ideal.direction(pixel)?)?;
         let radius = ((at - camera.centre_px) / camera.focal_px).length();

@@ -63,15 +63,15 @@ pub fn uncertainty_svg(camera: &CameraEstimate, map: &UncertaintyMap) -> String 
 /// The comparison of two cameras as a standalone SVG file: differences of projections over an
 /// image of `size_px`, px.
 pub fn comparison_svg(size_px: [u32; 2], found: &Comparison) -> String {
-    let places = found.places.iter();
+    let places = found.positions.iter();
     let values = places.map(|place| Some(place.as_ref()?.by.length()));
-    let outlined = found.places.iter().map(|place| place.is_some_and(|place| place.is_compared));
+    let outlined = found.positions.iter().map(|place| place.is_some_and(|place| place.is_compared));
     let every = (found.columns / ARROWS).max(1);
     let is_drawn = |index: usize| {
         let (row, column) = (index / found.columns, index % found.columns);
         row % every == every / 2 && column % every == every / 2
     };
-    let arrows = found.places.iter().enumerate().filter(|(index, _)| is_drawn(*index));
+    let arrows = found.positions.iter().enumerate().filter(|(index, _)| is_drawn(*index));
     let field = Field {
         size: DVec2::from(size_px.map(f64::from)),
         columns: found.columns,

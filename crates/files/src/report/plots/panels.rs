@@ -32,7 +32,7 @@ pub(super) struct Mark {
     /// Its offset in the panel frame, mm, drawn as an enlarged arrow.
     pub by_mm: DVec2,
     /// Whether the offset is significant; others are drawn in grey.
-    pub is_sure: bool,
+    pub is_confirmed: bool,
     /// CSS colour of the dot.
     pub colour: String,
     /// Tooltip; omitted if empty.
@@ -116,7 +116,7 @@ impl<'a> Panels<'a> {
         for mark in marks {
             let DVec2 { x, y } = origin + up * (mark.at_mm - low) * self.per_mm;
             let by = up * mark.by_mm * enlarged * self.per_mm;
-            let class = if mark.is_sure { "offset" } else { "offset chance" };
+            let class = if mark.is_confirmed { "offset" } else { "offset chance" };
             let title = match mark.title.as_str() {
                 "" => String::new(),
                 title => format!("<title>{title}</title>"),

@@ -14,7 +14,7 @@ use deltille_calibrate::{CameraEstimate, Corner};
 const FOOT: f64 = 58.0;
 
 /// Maximum number of dots in a scatter plot: more only enlarge the file.
-const MOST_DOTS: usize = 6000;
+const MAX_DOTS: usize = 6000;
 
 /// Radius of the ring that marks a corner outside a plot, user units.
 const BEYOND: f64 = 3.0;
@@ -23,7 +23,7 @@ const BEYOND: f64 = 3.0;
 const BINS: usize = 20;
 
 /// Maximum number of bars in the plot of views; with more views, each bar is the worst of several.
-const MOST_BARS: usize = 200;
+const MAX_BARS: usize = 200;
 
 /// Bins of the radial curve.
 const RINGS: usize = 12;
@@ -40,9 +40,9 @@ fn range_px(camera: &CameraEstimate) -> f64 {
     (4.0 * rms).max(1e-6)
 }
 
-/// Every n-th corner of a camera, where n leaves at most [`MOST_DOTS`].
+/// Every n-th corner of a camera, where n leaves at most [`MAX_DOTS`].
 fn thinned(camera: &CameraEstimate) -> impl Iterator<Item = &Corner> {
-    let step = camera.corner_count().div_ceil(MOST_DOTS).max(1);
+    let step = camera.corner_count().div_ceil(MAX_DOTS).max(1);
     camera.corners().step_by(step)
 }
 
@@ -264,7 +264,7 @@ pub(in crate::report) fn of_views(camera: &CameraEstimate, survey: &Survey) -> S
     let mut axes =
         Axes::new(frame(survey.size_px), [0.5, views.len() as f64 + 0.5], [0.0, 1.1 * worst]);
     // With many views, each bar is the worst of several.
-    let step = views.len().div_ceil(MOST_BARS).max(1);
+    let step = views.len().div_ceil(MAX_BARS).max(1);
     for (bar, views) in views.chunks(step).enumerate() {
         let px = views.iter().map(|view| view.rms_px).fold(0.0, f64::max);
         let first = (bar * step) as f64 + 0.5;

@@ -18,7 +18,7 @@ use deltille_core::statistics::median;
 const MARGIN: f64 = 36.0;
 
 /// Maximum number of views drawn per camera, evenly sampled: more would hide each other.
-const MOST_VIEWS: usize = 60;
+const MAX_VIEWS: usize = 60;
 
 /// Length of the pyramid of a camera as a fraction of the median distance of the target: for a fixed camera, and for one of
 /// many poses around a fixed target.
@@ -169,7 +169,7 @@ fn around_target(estimate: &Estimate, long: f64) -> Vec<Shape> {
     let mut widest: BTreeMap<PanelRef, (f64, Shape)> = BTreeMap::new();
     let mut cameras = Vec::new();
     for camera in &estimate.cameras {
-        let step = camera.views.len().div_ceil(MOST_VIEWS).max(1);
+        let step = camera.views.len().div_ceil(MAX_VIEWS).max(1);
         for view in camera.views.iter().step_by(step) {
             let target_from_rig = view.pose.inverse().after(&camera.camera_from_rig);
             for (panel, shape) in panels(estimate, camera, view, "board fixed") {
@@ -210,7 +210,7 @@ fn corners_ahead(camera: &Camera) -> [DVec2; 4] {
 fn targets(estimate: &Estimate) -> Vec<Shape> {
     let worst = estimate.frames.iter().map(|frame| frame.rms_px).fold(0.0, f64::max);
     let of_camera = |camera: &'_ CameraEstimate| {
-        let step = camera.views.len().div_ceil(MOST_VIEWS).max(1);
+        let step = camera.views.len().div_ceil(MAX_VIEWS).max(1);
         let views = camera.views.iter().step_by(step);
         let shapes = views.flat_map(|view| {
             let is_worst = view.rms_px >= worst && estimate.frames.len() > 1;

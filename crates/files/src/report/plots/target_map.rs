@@ -62,7 +62,7 @@ fn mark(map: &TargetMap, corner: &CornerOffset) -> Mark {
         col: corner.col,
         at_mm: corner.panel_mm.truncate(),
         by_mm: corner.offset_mm.truncate(),
-        is_sure: map.is_significant(corner),
+        is_confirmed: map.is_significant(corner),
         colour: String::new(),
         title: String::new(),
     }

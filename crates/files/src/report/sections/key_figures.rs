@@ -55,7 +55,7 @@ pub(in crate::report) fn of_rig(report: &Report) -> Vec<Figure> {
 
 /// The ink spread of the print, if it was measured together with its standard deviation.
 fn of_print(report: &Report) -> Option<Figure> {
-    let (um, deviation) = report.print.ink.and_then(|ink| ink.um.zip(ink.um_deviation))?;
+    let (um, deviation) = report.print.ink.and_then(|ink| ink.um.zip(ink.um_sd))?;
     let (um, deviation) = rounded(um, Some(deviation));
     Some((format!("{um} ± {deviation} µm"), "ink spread"))
 }

@@ -22,7 +22,7 @@ pub(in crate::report) fn section(camera: &CameraEstimate, tried: &[Candidate]) -
             format!("{own} is the simplest adequate model for this lens.")
         }
         (Some(best), Some(own)) => match tried.iter().find(|one| one.model == own) {
-            Some(one) if one.holds => {
+            Some(one) if one.is_adequate => {
                 format!(
                     "{own} describes the lens; {best} does so with fewer or better determined parameters."
                 )
@@ -59,7 +59,7 @@ fn row(camera: &CameraEstimate, one: &Candidate, worst: f64) -> String {
     let notes = [
         (own, "this page"),
         (one.chosen, "simplest adequate model"),
-        (one.holds && !one.chosen, "equally good"),
+        (one.is_adequate && !one.chosen, "equally good"),
         (one.held_out_px.is_some() && !one.is_stable, "ill-conditioned parameters"),
     ];
     let notes: Vec<&str> =

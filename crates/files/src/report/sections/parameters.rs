@@ -46,7 +46,7 @@ pub(in crate::report) fn section(camera: &CameraEstimate) -> String {
         true => "<th>1σ from noise</th><th>1σ observed</th>",
         false => "<th>1σ from noise</th>",
     };
-    let names: Vec<&str> = camera.found().collect();
+    let names: Vec<&str> = camera.estimated_parameters().collect();
     let mut matrix = String::new();
     if !names.is_empty() {
         let heads = names.iter().map(|name| format!("<th>{}</th>", escaped(name)));

@@ -7,8 +7,8 @@ use glam::DVec3;
 use crate::report::content::Report;
 use crate::report::html::{escaped, meter, out_row};
 use crate::report::sections::numbers::{aligned, rounded};
-use crate::report::sections::views::MOST_VIEWS;
-use deltille_calibrate::{FrameEstimate, PanelPlace};
+use crate::report::sections::views::MAX_VIEWS;
+use deltille_calibrate::{FrameEstimate, PanelPrior};
 use deltille_core::camera::Pose;
 
 /// Relative camera poses.
@@ -108,7 +108,7 @@ pub(in crate::report) fn panels(report: &Report) -> String {
 }
 
 /// Rotation, rad, and translation, mm, of a panel relative to its stated pose.
-fn off(found: &PanelPlace, stated: &PanelPlace) -> [DVec3; 2] {
+fn off(found: &PanelPrior, stated: &PanelPrior) -> [DVec3; 2] {
     found.target_from_panel.off(&stated.target_from_panel)
 }
 
@@ -132,13 +132,13 @@ pub(in crate::report) fn frames(report: &Report) -> String {
     let estimate = report.estimate;
     let mut order: Vec<usize> = (0..estimate.frames.len()).collect();
     let rms = |&index: &usize| estimate.frames[index].rms_px;
-    let note = match order.len() > MOST_VIEWS {
-        true => format!("<p>The worst {MOST_VIEWS} of {} frames.</p>", order.len()),
+    let note = match order.len() > MAX_VIEWS {
+        true => format!("<p>The worst {MAX_VIEWS} of {} frames.</p>", order.len()),
         false => String::new(),
     };
-    if order.len() > MOST_VIEWS {
+    if order.len() > MAX_VIEWS {
         order.sort_by(|a, b| rms(b).total_cmp(&rms(a)));
-        order.truncate(MOST_VIEWS);
+        order.truncate(MAX_VIEWS);
         order.sort_unstable();
     }
     let worst = order.iter().map(rms).fold(f64::MIN_POSITIVE, f64::max);

@@ -11,7 +11,7 @@ use deltille_core::statistics::quantile;
 use deltille_core::words::counted;
 
 /// Maximum number of views in the table; with more views, the worst are listed.
-pub(super) const MOST_VIEWS: usize = 300;
+pub(super) const MAX_VIEWS: usize = 300;
 
 /// Number of views shown as images.
 const IN_PICTURES: usize = 8;
@@ -30,7 +30,7 @@ fn order(camera: &CameraEstimate) -> Vec<usize> {
     let mut order: Vec<usize> = (0..camera.views.len()).collect();
     let rms = |index: usize| camera.views[index].rms_px;
     order.sort_by(|&a, &b| rms(b).total_cmp(&rms(a)));
-    order.truncate(MOST_VIEWS);
+    order.truncate(MAX_VIEWS);
     order
 }
 
@@ -77,8 +77,8 @@ pub(in crate::report) fn section(report: &Report, index: usize, survey: &Survey)
             format!("<div class=\"wide-table\"><table class=\"plain out\">{rows}</table></div>")
         }
     };
-    let what = match all > MOST_VIEWS {
-        true => format!("The worst {MOST_VIEWS} of {all} views in a table"),
+    let what = match all > MAX_VIEWS {
+        true => format!("The worst {MAX_VIEWS} of {all} views in a table"),
         false => format!("All {} in a table", counted(all + of_test.len(), "view")),
     };
     let bent = match report.has_panels() {

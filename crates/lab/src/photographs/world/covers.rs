@@ -22,10 +22,10 @@ pub struct Covers(Vec<Stroke>);
 const STEPS: u32 = 200;
 
 /// Maximum number of hands over a board; two cover half of it.
-const MOST_HANDS: u32 = 6;
+const MAX_HANDS: u32 = 6;
 
 /// Maximum number of objects placed on a board until enough of it is covered.
-const MOST_THINGS: usize = 500;
+const MAX_THINGS: usize = 500;
 
 impl Covers {
     /// Creates covers over a given fraction of the positions: hands that reach in from the sides, or, if `scattered`,
@@ -43,7 +43,7 @@ impl Covers {
             hidden.count() as f64 >= part * places.len() as f64
         };
         if scattered {
-            while !enough(&covers, part) && covers.0.len() < MOST_THINGS {
+            while !enough(&covers, part) && covers.0.len() < MAX_THINGS {
                 let from = middle
                     + reach * DVec2::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0));
                 let turn = rng.random_range(0.0..std::f64::consts::TAU);
@@ -55,7 +55,7 @@ impl Covers {
         }
         // One hand for each third of the board, from all directions.
         let first = rng.random_range(0.0..std::f64::consts::TAU);
-        for hand in 1..=MOST_HANDS {
+        for hand in 1..=MAX_HANDS {
             let turn = first + f64::from(hand) * rng.random_range(2.0..2.8);
             let share = part.min(f64::from(hand) / 3.0);
             let shape = hand_shape(reach, rng);

@@ -21,10 +21,10 @@ pub(crate) struct Mips {
 
 impl Mips {
     pub(crate) fn new(image: Gray<u8>, beyond: Beyond) -> Self {
-        const LEAST_SIDE: usize = 8;
+        const MIN_SIDE: usize = 8;
         let mut levels = vec![image];
         while let Some(last) = levels.last()
-            && last.width().min(last.height()) >= 2 * LEAST_SIDE
+            && last.width().min(last.height()) >= 2 * MIN_SIDE
         {
             let next = half(last);
             levels.push(next);
@@ -69,7 +69,7 @@ pub(crate) struct Footprint {
 }
 
 /// Maximum number of samples along the long axis: sufficient for a tilt of more than 85°.
-const MOST_SAMPLES: u32 = 12;
+const MAX_SAMPLES: u32 = 12;
 
 impl Footprint {
     fn new(across: DVec2, down: DVec2, levels: usize) -> Self {
@@ -82,7 +82,7 @@ impl Footprint {
         let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
         let level = (short.max(1.0).log2().ceil() as usize).min(levels - 1);
         let texel = (1u32 << level) as f64;
-        let samples = ((long / texel).ceil() as u32).clamp(1, MOST_SAMPLES);
+        let samples = ((long / texel).ceil() as u32).clamp(1, MAX_SAMPLES);
         Self { level, scale: 1.0 / texel, samples, long: long * DVec2::from_angle(angle) }
     }
 }

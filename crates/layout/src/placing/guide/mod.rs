@@ -51,7 +51,7 @@ const FIGURE_SHARE: (f64, f64) = (0.35, 0.62);
 /// Length of the axes in the figure, mm.
 const AXIS_MM: f64 = 12.0;
 /// Sine of the smallest viewing angle at which a face is numbered.
-const LEAST_SINE: f64 = 0.2;
+const MIN_SINE: f64 = 0.2;
 /// Capital heights of face numbers, mm.
 const NUMBER_CAP_MM: std::ops::RangeInclusive<f64> = 1.5..=6.0;
 
@@ -255,7 +255,7 @@ impl Page {
     ) {
         let circle = Incircle::of(&model.faces[face]);
         let sine = circle.normal.dot(model.view.towards);
-        if sine < LEAST_SINE || model.is_hidden(circle.centre, Some(face)) {
+        if sine < MIN_SINE || model.is_hidden(circle.centre, Some(face)) {
             return;
         }
         let cap = (0.5 * sine * circle.radius * scale).min(*NUMBER_CAP_MM.end());

@@ -14,7 +14,7 @@ pub(super) const THIN_MM: f64 = 0.15;
 /// Number of pieces into which a line is divided; each is either hidden or drawn.
 const PIECES: usize = 60;
 /// Maximum number of tiles of a board that are drawn: more would run together.
-const MOST_TILES: usize = 250;
+const MAX_TILES: usize = 250;
 /// Thickness of the plate in the figure, as a fraction of its diagonal.
 const PLATE_PART: f64 = 0.02;
 /// Number of sides of the polygon that approximates a circle.
@@ -152,7 +152,7 @@ impl Model {
 /// visible.
 fn tile_lines(panel: &Panel) -> Vec<[DVec2; 2]> {
     let tiles = panel.dark_tiles();
-    if tiles.len().max(panel.corners.len()) > MOST_TILES || panel.corners.is_empty() {
+    if tiles.len().max(panel.corners.len()) > MAX_TILES || panel.corners.is_empty() {
         return Vec::new();
     }
     if let Some(diameter) = panel.discs_mm {

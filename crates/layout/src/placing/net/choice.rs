@@ -42,7 +42,7 @@ pub(super) fn nest_on(flat: &[Vec<DVec2>], sides: &Sides, room: DVec2) -> Option
         let mut fewest = usize::MAX;
         for seed in 0..ORDERS {
             let most = room * part;
-            let fit = |points: &[DVec2]| nest::fits(points, tabs::MOST_DEPTH_MM, most);
+            let fit = |points: &[DVec2]| nest::fits(points, tabs::MAX_DEPTH_MM, most);
             let pieces = unfold::in_pieces_that_fit(flat, sides, seed, fit);
             fewest = fewest.min(pieces.len());
             let Some(net) = with_tabs(pieces, sides) else { continue };

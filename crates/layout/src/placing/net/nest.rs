@@ -22,7 +22,7 @@ const BLANK_MM: f64 = 2.0;
 const CELLS: f64 = 300.0;
 
 /// Smallest cell, mm.
-const LEAST_CELL_MM: f64 = 1.0;
+const MIN_CELL_MM: f64 = 1.0;
 
 /// Number of rotations tried for a piece.
 const TURNS: usize = 12;
@@ -41,7 +41,7 @@ pub(super) struct Place {
 
 /// Nests pieces in areas of this width and height, mm; `None` if a piece does not fit.
 pub(super) fn nest(pieces: &[Outline], room: DVec2) -> Option<Vec<Place>> {
-    let cell = (room.max_element() / CELLS).max(LEAST_CELL_MM);
+    let cell = (room.max_element() / CELLS).max(MIN_CELL_MM);
     let mut order: Vec<usize> = (0..pieces.len()).collect();
     let areas: Vec<f64> = pieces.iter().map(|piece| piece.iter().map(|p| area(p)).sum()).collect();
     order.sort_by(|&a, &b| areas[b].total_cmp(&areas[a]).then(a.cmp(&b)));

@@ -11,7 +11,7 @@ use crate::Placement;
 use crate::SheetLayout;
 use crate::paper::{PaperSpec, SolidSheets};
 use crate::placing::arrangement::{Arrangement, Footprint, fit_upright};
-use crate::placing::poster::{MOST_PAGES, Poster};
+use crate::placing::poster::{MAX_PAGES, Poster};
 use deltille_core::lattice::Vertex;
 use deltille_core::polygon;
 use deltille_core::setting::Setting::{
@@ -21,10 +21,10 @@ use deltille_core::targets::format_mm;
 use deltille_core::targets::{FamilyRef, Panel, SolidSpec, TargetError};
 
 /// Smallest face margin with room for numbers, mm.
-const LEAST_MARGIN_MM: f64 = 2.5;
+const MIN_MARGIN_MM: f64 = 2.5;
 
 /// Smallest usable area for pieces of a net, mm.
-const LEAST_ROOM_MM: f64 = 40.0;
+const MIN_ROOM_MM: f64 = 40.0;
 
 /// A piece of a net placed on a sheet.
 struct Laid<'a> {
@@ -42,11 +42,11 @@ pub(crate) fn sheets(
     family: Option<&FamilyRef>,
     paper: &PaperSpec,
 ) -> Result<Vec<SheetLayout>, TargetError> {
-    if spec.margin_mm < LEAST_MARGIN_MM {
+    if spec.margin_mm < MIN_MARGIN_MM {
         let problem = format!(
             "the numbers of a net are printed in the face margins: use at least {} instead of {}, or \
              {SolidSheetsPerFace}",
-            format_mm(LEAST_MARGIN_MM),
+            format_mm(MIN_MARGIN_MM),
             format_mm(spec.margin_mm)
         );
         return Err(TargetError::invalid(SolidMarginMm, problem));
@@ -131,8 +131,8 @@ fn nested(
     for (index, size) in sizes.iter().enumerate() {
         let paper = PaperSpec { size: Some(size.clone()), ..paper.clone() };
         let least = Footprint {
-            width: LEAST_ROOM_MM,
-            height: LEAST_ROOM_MM + WORDS_MM,
+            width: MIN_ROOM_MM,
+            height: MIN_ROOM_MM + WORDS_MM,
             edge_blank: paper.margin_mm,
             mark_blank: BLANK_MM,
             is_centred: false,
@@ -150,7 +150,7 @@ fn nested(
         if count > 1 && !is_last {
             continue;
         }
-        if count > MOST_PAGES {
+        if count > MAX_PAGES {
             let problem = format!(
                 "the net of a solid with {} edges takes {count} pages of {size}, more than can be assembled: use \
                  {SolidSheetsPerFace}, a shorter {SolidEdgeMm}, or a larger {PaperSize}",
@@ -227,11 +227,11 @@ fn lay<'a>(
     let points = points(piece, tabs);
     // Upright first, then with increasing slant.
     let slanted = (1..18).flat_map(|n| [5 * n, -5 * n]).filter(|n| n % 90 != 0);
-    let turns: Vec<f64> =
+    let rotations: Vec<f64> =
         [0, 90].into_iter().chain(slanted).map(|n| f64::from(n).to_radians()).collect();
     for size in sizes {
         let paper = PaperSpec { size: Some(size), ..paper.clone() };
-        for &angle in &turns {
+        for &angle in &rotations {
             let turn = Motion::turning(angle);
             let turned: Vec<DVec2> = points.iter().map(|&p| turn.apply(p)).collect();
             let [left, lower, right, upper] = bounds(&turned);

@@ -17,10 +17,10 @@ use deltille_core::angles::tangent;
 
 /// Depth of a tab as a fraction of its edge, and its minimum and maximum, mm: the minimum fits the text, the maximum is
 /// sufficient for gluing.
-const DEPTH: (f64, f64, f64) = (0.15, 4.0, MOST_DEPTH_MM);
+const DEPTH: (f64, f64, f64) = (0.15, 4.0, MAX_DEPTH_MM);
 
 /// Maximum depth of a tab, mm.
-pub(super) const MOST_DEPTH_MM: f64 = 9.0;
+pub(super) const MAX_DEPTH_MM: f64 = 9.0;
 
 /// Angles between the edge of a tab and its legs, degrees, in the order tried: the usual one, flatter ones for narrow
 /// gaps, and a steep one for short edges.

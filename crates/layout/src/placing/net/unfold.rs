@@ -15,11 +15,11 @@ use deltille_core::targets::{Polyhedron, SolidShape};
 const SEED: u64 = 20;
 
 /// Number of grown nets that are considered further.
-const MOST_GROWN: usize = 8;
+const MAX_GROWN: usize = 8;
 
 /// Smallest angle between two cut sides that meet in a vertex, radians: room for a tab with the flattest legs, and for
 /// scissors.
-const LEAST_GAP_RAD: f64 = 25.0 / 180.0 * PI;
+const MIN_GAP_RAD: f64 = 25.0 / 180.0 * PI;
 
 /// Returns the number of growth orders tried for a mesh. It decreases with the number of faces, because the time per
 /// order grows with its square.
@@ -119,7 +119,7 @@ fn grown(solid: &Polyhedron, flat: &[Vec<DVec2>]) -> Vec<Vec<Piece>> {
     let mut grown: Vec<Vec<Piece>> =
         (0..tries(flat.len())).map(|n| grow_all(flat, &sides, n, |_, _| true)).collect();
     grown.sort_by(|a, b| a.len().cmp(&b.len()).then(area(a).total_cmp(&area(b))));
-    grown.truncate(MOST_GROWN);
+    grown.truncate(MAX_GROWN);
     grown
 }
 
@@ -171,7 +171,7 @@ fn leaves_gaps(piece: &[FlatFace], face: &FlatFace) -> bool {
             [(from - last, on_last), (first - to, on_first)].into_iter().all(|(gap, hinged)| {
                 let gap = gap.rem_euclid(TAU);
                 let closed = gap.min(TAU - gap) < 1e-6;
-                if closed { hinged } else { gap >= LEAST_GAP_RAD }
+                if closed { hinged } else { gap >= MIN_GAP_RAD }
             })
         })
     })

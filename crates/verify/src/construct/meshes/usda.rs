@@ -115,7 +115,7 @@ pub(crate) fn list(line: &str) -> Option<(&'static str, Vec<f64>)> {
     };
     let whole = |word: &str| {
         let digits = word.bytes().all(|byte| byte.is_ascii_digit());
-        (digits && word.len() <= MOST_DIGITS_OF_INDEX).then(|| decimal(word)).flatten()
+        (digits && word.len() <= MAX_DIGITS_OF_INDEX).then(|| decimal(word)).flatten()
     };
     let entry = |entry: &str| -> Option<Vec<f64>> {
         if size == 1 {
@@ -142,7 +142,7 @@ pub(crate) fn list(line: &str) -> Option<(&'static str, Vec<f64>)> {
 }
 
 /// Maximum number of digits of an index, so that it fits into 32 bits with its sign.
-const MOST_DIGITS_OF_INDEX: usize = 9;
+const MAX_DIGITS_OF_INDEX: usize = 9;
 
 #[cfg(test)]
 mod tests {

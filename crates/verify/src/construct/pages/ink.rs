@@ -10,23 +10,23 @@ pub(super) const OFF_PAGE: &str = "a mark that extends beyond the page";
 
 /// Maximum length of all contours per area of the page, 1/mm: even tags in all tiles, with cells of 0.1 mm, have
 /// less.
-const MOST_PER_MM: f64 = 40.0;
+const MAX_PER_MM: f64 = 40.0;
 
 /// Maximum total area of strokes and of the rectangles around filled paths, in page areas: those of tiles and cells
 /// overlap little.
-const MOST_PAGES: f64 = 40.0;
+const MAX_PAGES: f64 = 40.0;
 
 /// Minimum width of an area or line, mm: some viewers draw thinner ones one pixel wide, others not at all. Cells and
 /// letter strokes are wider.
-const LEAST_WIDTH_MM: f64 = 0.01;
+const MIN_WIDTH_MM: f64 = 0.01;
 
-/// Problem of a mark below [`LEAST_WIDTH_MM`].
+/// Problem of a mark below [`MIN_WIDTH_MM`].
 const THIN: &str = "a mark that is thinner than 0.01 mm";
 
 /// Problem of a mark on top of an identical one: some viewers draw pixels that both partly cover darker.
 const TWICE: &str = "a mark that is drawn twice";
 
-/// Key that identifies equal marks, in units of [`LEAST_WIDTH_MM`]: the bounds on each side, the side of a square of
+/// Key that identifies equal marks, in units of [`MIN_WIDTH_MM`]: the bounds on each side, the side of a square of
 /// equal area, the diagonal along which the points lie, and the pen width.
 type Outline = [i64; 7];
 
@@ -67,7 +67,7 @@ impl Ink {
             }
         }
         let is_thick = self.is_thick(path, pen);
-        let least = LEAST_WIDTH_MM / self.mm;
+        let least = MIN_WIDTH_MM / self.mm;
         let side = path.area().abs().sqrt();
         let middle = around.center();
         let products: Vec<f64> = path
@@ -90,7 +90,7 @@ impl Ink {
     /// Whether the pen, or without one each contour of a filled path, is wide enough to be drawn the same way by all
     /// viewers.
     fn is_thick(&self, path: &BezPath, pen: Option<f64>) -> bool {
-        let least = LEAST_WIDTH_MM / self.mm;
+        let least = MIN_WIDTH_MM / self.mm;
         if let Some(width) = pen {
             return width >= least;
         }
@@ -108,7 +108,7 @@ impl Ink {
     /// Whether the marks so far are within the bounds that keep rendering fast.
     pub(super) fn is_drawable(&self) -> bool {
         // Written so that NaN is rejected, too.
-        self.length <= MOST_PER_MM * self.mm * self.page && self.area <= MOST_PAGES * self.page
+        self.length <= MAX_PER_MM * self.mm * self.page && self.area <= MAX_PAGES * self.page
     }
 }
 

@@ -37,7 +37,7 @@ const FARTHEST: f64 = 1e5;
 const EDGE_SLACK_MM: f64 = 1e-3;
 
 /// Maximum number of attributes of an element: readers compare each with all others.
-const MOST_ATTRIBUTES: usize = 1000;
+const MAX_ATTRIBUTES: usize = 1000;
 
 /// Inspects an SVG for constructs that are not allowed.
 ///
@@ -50,8 +50,8 @@ pub(in crate::construct) fn check(
     limits: &Limits,
 ) -> Result<Findings, String> {
     let text = text(bytes)?;
-    if text.split('<').any(|tag| tag.matches('=').count() > MOST_ATTRIBUTES) {
-        return Err(format!("an element with more than {MOST_ATTRIBUTES} attributes"));
+    if text.split('<').any(|tag| tag.matches('=').count() > MAX_ATTRIBUTES) {
+        return Err(format!("an element with more than {MAX_ATTRIBUTES} attributes"));
     }
     let mut found = Findings::default();
     head(text, &mut found);

@@ -14,10 +14,10 @@ use super::option_checks::{is_false, is_usual, length};
 use super::{logo, template};
 use crate::values::{number, whole};
 use deltille::export::dsc::Dialect;
-use deltille::family::places;
+use deltille::family::positions;
 use deltille::lattice::GridKind;
 use deltille::layout::{DEFAULT_MARGIN_MM, PaperSize, PaperSpec, usual_edge_mm};
-use deltille::targets::{BORDER_BITS, BoardSpec, MOST_ROWS, SIDES, TagSpec, TagsIn};
+use deltille::targets::{BORDER_BITS, BoardSpec, MAX_ROWS, SIDES, TagSpec, TagsIn};
 
 /// Resolution of PNG files, dots per inch.
 pub const DEFAULT_DPI: u32 = 300;
@@ -70,7 +70,7 @@ pub struct BoardSettings {
     untagged: bool,
     /// Put a tag in every N-th row and column; on a checkerboard, only where that square has the tag colour (for odd N,
     /// every second position) [default: 3; 2 on a checkerboard]
-    #[arg(long, help_heading = TAGS, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
+    #[arg(long, help_heading = TAGS, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MAX_ROWS))]
     tag_spacing: Option<u32>,
     /// Width of a tag's black border in cells, 0.6 to 10, at least 1 on a checkerboard [default: 1.5; 2 in black
     /// squares, 1 in white ones]
@@ -92,7 +92,7 @@ pub struct BoardSettings {
     board_id: Option<u32>,
     /// Number of boards, identical except for their ids; each on its own sheet, or several per sheet with --pack
     /// [default: 1]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MAX_ROWS))]
     boards: Option<u32>,
     /// Exchange black and white: white tiles on black
     #[arg(long)]
@@ -331,7 +331,7 @@ impl BoardSettings {
         }
         let of_tags = self.of_tags();
         check_tags(self.untagged, self.dense, &of_tags)?;
-        let family = if self.dense { Some(places::NAME) } else { self.family.as_deref() };
+        let family = if self.dense { Some(positions::NAME) } else { self.family.as_deref() };
         let usual = TagSpec::usual(grid, family, self.tags_in.unwrap_or_default());
         let tagged = !self.untagged && (grid == GridKind::Deltille || self.family.is_some());
         if grid == GridKind::Checker

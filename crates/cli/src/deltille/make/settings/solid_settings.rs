@@ -14,11 +14,11 @@ use super::option_checks::{is_false, is_usual, length, refuse_idle};
 use super::{logo, template};
 use crate::values::{number, whole};
 use deltille::export::dsc::Dialect;
-use deltille::family::places;
+use deltille::family::positions;
 use deltille::lattice::GridKind;
 use deltille::layout::{DEFAULT_MARGIN_MM, PaperSize, PaperSpec, SolidSheets};
 use deltille::targets::{
-    BORDER_BITS, FACE_TILES, MOST_ROWS, SkeletonSpec, SolidShape, SolidSpec, TagSpec, TagsIn,
+    BORDER_BITS, FACE_TILES, MAX_ROWS, SkeletonSpec, SolidShape, SolidSpec, TagSpec, TagsIn,
 };
 
 /// Help heading of bodies and outlines.
@@ -74,7 +74,7 @@ pub struct SolidSettings {
     #[serde(skip_serializing_if = "is_false")]
     pub invert: bool,
     /// Put a tag in every N-th row and column of a face [default: 3]
-    #[arg(long, help_heading = TAGS, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
+    #[arg(long, help_heading = TAGS, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MAX_ROWS))]
     pub tag_spacing: Option<u32>,
     /// Width of a tag's black border in cells [default: 1.5]
     #[arg(long, help_heading = TAGS, value_name = "BITS", allow_negative_numbers = true, value_parser = number(BORDER_BITS))]
@@ -344,7 +344,7 @@ impl SolidSettings {
         if self.untagged {
             return Ok(None);
         }
-        let family = if self.dense { Some(places::NAME) } else { self.family.as_deref() };
+        let family = if self.dense { Some(positions::NAME) } else { self.family.as_deref() };
         let tags = TagSpec::usual(tiling, family, TagsIn::Black);
         Ok(Some(TagSpec {
             hole_mm: length("hole", &self.hole)?,

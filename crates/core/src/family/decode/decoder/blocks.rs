@@ -37,8 +37,9 @@ impl Blocks {
         let bits = family.dimension().bits();
         let correctable = family.correctable();
         let (count, _) = block_count(family);
-        let turns = TagWords::new(family.dimension());
-        let words: Vec<u64> = family.codes().iter().flat_map(|&code| turns.turns(code)).collect();
+        let rotations = TagWords::new(family.dimension());
+        let words: Vec<u64> =
+            family.codes().iter().flat_map(|&code| rotations.rotations(code)).collect();
         let blocks = (0..count)
             .map(|i| (i * bits / count, (i + 1) * bits / count))
             .map(|(shift, end)| Block::new(bits, shift, (end - shift).min(MAX_BLOCK_BITS), &words))
@@ -69,7 +70,7 @@ impl Blocks {
                             let errors = (word ^ self.words[reading as usize]).count_ones();
                             (errors <= max_errors).then_some(Decoded {
                                 id: reading / 3,
-                                turns: (reading % 3) as u8,
+                                rotations: (reading % 3) as u8,
                                 errors,
                                 runner_up: None,
                             })

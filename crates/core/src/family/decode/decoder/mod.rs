@@ -17,7 +17,7 @@ pub struct Decoded {
     pub id: u32,
     /// Number of counterclockwise rotations of the tag that give the word: by 120°, 0 to 2, or by 90° for a square
     /// tag, 0 to 3.
-    pub turns: u8,
+    pub rotations: u8,
     /// Number of cells in which the word differs from the code.
     pub errors: u32,
     /// Errors of the second-best reading (another tag or another rotation), if it is also within the allowed errors.
@@ -131,7 +131,7 @@ impl Decoder {
     /// Returns the word of a decoded code, without its errors.
     pub fn word(&self, decoded: Decoded) -> u64 {
         let code = self.codes.get(decoded.id as usize).copied().unwrap_or(0);
-        (0..decoded.turns).fold(code, |word, _| self.words.turn(word))
+        (0..decoded.rotations).fold(code, |word, _| self.words.rotate(word))
     }
 
     fn decode_beyond(&self, word: u64, max_errors: u32) -> Option<Decoded> {
@@ -141,11 +141,11 @@ impl Decoder {
     /// Returns the closest code in the cells that are not hidden; compares all codes.
     fn nearest(&self, word: u64, hidden: u64, max_errors: u32) -> Option<Decoded> {
         // Rotating the word back by k steps is equivalent to comparing it with every code rotated k times.
-        let full = usize::from(self.kind.turns());
+        let full = usize::from(self.kind.rotations());
         let turned_back = |word: u64| {
             let mut turned_back = [word; 4];
-            for turns in (1..full).rev() {
-                turned_back[turns] = self.words.turn(turned_back[(turns + 1) % full]);
+            for rotations in (1..full).rev() {
+                turned_back[rotations] = self.words.rotate(turned_back[(rotations + 1) % full]);
             }
             turned_back
         };
@@ -153,20 +153,20 @@ impl Decoder {
         let turned_back = turned_back(word);
         let (mut best, mut second) = ((u32::MAX, 0, 0), u32::MAX);
         for (id, code) in (0..).zip(&self.codes) {
-            for (turns, (back, seen)) in (0..).zip(turned_back[..full].iter().zip(&seen)) {
+            for (rotations, (back, seen)) in (0..).zip(turned_back[..full].iter().zip(&seen)) {
                 let errors = ((back ^ code) & seen).count_ones();
                 if errors < best.0 {
                     second = best.0;
-                    best = (errors, id, turns);
+                    best = (errors, id, rotations);
                 } else {
                     second = second.min(errors);
                 }
             }
         }
-        let (errors, id, turns) = best;
+        let (errors, id, rotations) = best;
         (errors <= max_errors).then_some(Decoded {
             id,
-            turns,
+            rotations,
             errors,
             runner_up: (second <= max_errors).then_some(second),
         })
@@ -193,16 +193,17 @@ mod tests {
                     continue;
                 };
                 for mask in hidden.masks(family.dimension()) {
-                    let (id, turns) = (rng.random_range(0..family.len()), rng.random_range(0..3u8));
-                    let code = words.turns(family.codes()[id])[usize::from(turns)];
+                    let (id, rotations) =
+                        (rng.random_range(0..family.len()), rng.random_range(0..3u8));
+                    let code = words.rotations(family.codes()[id])[usize::from(rotations)];
                     let mut read = code ^ (rng.random::<u64>() & mask);
                     let errors = (left - 1) / 2;
                     while ((read ^ code) & !mask).count_ones() < errors {
                         read ^= 1 << rng.random_range(0..family.dimension().bits());
                     }
                     let found = decoder.decode_erased(read, mask, errors).unwrap();
-                    let decoded = (found.id as usize, found.turns, found.errors);
-                    assert_eq!(decoded, (id, turns, errors), "{name}, {hidden:?}");
+                    let decoded = (found.id as usize, found.rotations, found.errors);
+                    assert_eq!(decoded, (id, rotations, errors), "{name}, {hidden:?}");
                     // With all cells hidden, nothing can be decoded.
                     assert!(decoder.decode_erased(read, family.dimension().mask(), 0).is_none());
                 }

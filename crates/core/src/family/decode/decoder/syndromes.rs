@@ -54,13 +54,13 @@ impl Syndromes {
         let bits = family.dimension().bits();
         let correctable = family.correctable();
         let words = TagWords::new(family.dimension());
-        let is_invariant = code.rows().iter().all(|&row| code.contains(words.turn(row)));
+        let is_invariant = code.rows().iter().all(|&row| code.contains(words.rotate(row)));
         if ball(bits, correctable) > 3.0 * MAX_PATTERNS || !is_invariant {
             return None;
         }
         let syndromes = code.syndromes(bits)?;
         // Free bits are words with the syndromes 1, 2, 4, …
-        let turn_of = |&bit: &u32| syndromes.apply(words.turn(1 << bit));
+        let turn_of = |&bit: &u32| syndromes.apply(words.rotate(1 << bit));
         let turned: Vec<u32> = code.free_bits(bits).iter().map(turn_of).collect();
         let turned = LinearMap::of_columns(&turned);
         let cells = (0..bits).map(|bit| 1 << bit).filter(|bit| ignored & bit == 0);
@@ -85,11 +85,11 @@ impl Syndromes {
             let canonical = self.words.canonical(meant);
             let at = self.ids.binary_search_by_key(&canonical, |&(word, _)| word).ok()?;
             let id = self.ids[at].1;
-            let turned = self.words.turns(codes[id as usize]);
-            let turns = turned.iter().position(|turned| turned & !self.ignored == meant)?;
-            let errors = (word ^ turned[turns]).count_ones();
-            let turns = turns as u8;
-            (errors <= max_errors).then_some(Decoded { id, turns, errors, runner_up: None })
+            let turned = self.words.rotations(codes[id as usize]);
+            let rotations = turned.iter().position(|turned| turned & !self.ignored == meant)?;
+            let errors = (word ^ turned[rotations]).count_ones();
+            let rotations = rotations as u8;
+            (errors <= max_errors).then_some(Decoded { id, rotations, errors, runner_up: None })
         })
     }
 }
@@ -98,13 +98,13 @@ impl Syndromes {
     /// Returns the error pattern with a syndrome.
     #[inline]
     fn errors(&self, syndrome: u32) -> Option<u64> {
-        let turns = turns_of(&self.turned, syndrome);
-        let least = turns[0].min(turns[1]).min(turns[2]);
+        let rotations = turns_of(&self.turned, syndrome);
+        let least = rotations[0].min(rotations[1]).min(rotations[2]);
         let pattern = self.patterns.get(least)?;
         // Two more rotations undo one, and vice versa.
-        Some(match turns.iter().position(|&syndrome| syndrome == least) {
-            Some(1) => self.words.turn(self.words.turn(pattern)),
-            Some(2) => self.words.turn(pattern),
+        Some(match rotations.iter().position(|&syndrome| syndrome == least) {
+            Some(1) => self.words.rotate(self.words.rotate(pattern)),
+            Some(2) => self.words.rotate(pattern),
             _ => pattern,
         })
     }

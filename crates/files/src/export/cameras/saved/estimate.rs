@@ -194,7 +194,7 @@ impl SavedCamera {
         camera.parameters = parameters.collect();
         camera.covariance = covariance;
         camera.projection = projection;
-        camera.ill_conditioned = self.loose;
+        camera.ill_conditioned = self.ill_conditioned;
         camera.camera_from_rig = place.map_or(Pose::IDENTITY, SavedPose::pose);
         camera.pose_sd = place.and_then(SavedPose::sd);
         camera.observed_pose_sd = self.observed_pose_sd;

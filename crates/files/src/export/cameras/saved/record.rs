@@ -91,7 +91,8 @@ pub(super) struct SavedCamera {
     pub(super) parameters: Vec<SavedParameter>,
     #[serde(deserialize_with = "quantity::figure::de")]
     pub(super) correlations: Vec<Vec<f64>>,
-    pub(super) loose: Vec<String>,
+    #[serde(alias = "loose")]
+    pub(super) ill_conditioned: Vec<String>,
     pub(super) projection: Option<SavedProjection>,
     pub(super) camera_from_rig: Option<SavedPose>,
     #[serde(default)]
@@ -224,9 +225,9 @@ pub(super) struct SavedOffset {
     pub(super) row: i32,
     #[serde(deserialize_with = "quantity::place_in_lattice::de")]
     pub(super) col: i32,
-    #[serde(deserialize_with = "quantity::place_mm::de")]
+    #[serde(deserialize_with = "quantity::position_mm::de")]
     pub(super) panel_mm: [f64; 3],
-    #[serde(deserialize_with = "quantity::place_mm::de")]
+    #[serde(deserialize_with = "quantity::position_mm::de")]
     pub(super) offset_mm: [f64; 3],
     #[serde(deserialize_with = "quantity::figure::de")]
     pub(super) covariance_mm2: [[f64; 3]; 3],

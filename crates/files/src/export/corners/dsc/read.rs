@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::{Dialect, DscError, FAMILIES};
 use deltille_core::family::Family;
 use deltille_core::lattice::{GridKind, Vertex};
-use deltille_core::quantity::{Range, border_bits, edge_mm, place_mm};
+use deltille_core::quantity::{Range, border_bits, edge_mm, position_mm};
 use deltille_core::statistics::median;
 use deltille_core::targets::{
     Corner, FamilyRef, ListFormat, Name, Outline, Panel, PanelPose, TagPlacement, TagsIn, Target,
@@ -234,7 +234,9 @@ impl<'a> Block<'a> {
         for (&vertex, listed) in &by_vertex {
             let target_mm = listed.position * unit_mm;
             for place in target_mm.to_array() {
-                place_mm::RANGE.check(place).map_err(|what| listed.line.fault(what.to_string()))?;
+                position_mm::RANGE
+                    .check(place)
+                    .map_err(|what| listed.line.fault(what.to_string()))?;
             }
             panel.corners.push(Corner {
                 id: *next_id,
@@ -304,7 +306,7 @@ impl<'a> ListedCorner<'a> {
             }
         };
         let position = [("x", x), ("y", y), ("z", z)];
-        let [x, y, z] = position.map(|(what, field)| line.within(field, what, place_mm::RANGE));
+        let [x, y, z] = position.map(|(what, field)| line.within(field, what, position_mm::RANGE));
         let position = DVec3::new(x?, y?, z?);
         Ok(Self { line, vertex: Vertex::new(row as i32, col as i32), tag, position })
     }

@@ -59,6 +59,12 @@ impl Column {
     const fn extra(self) -> Self {
         Self { needed: false, ..self }
     }
+
+    /// Returns the name of the column before version 0.1.
+    pub(super) fn earlier_name(self) -> String {
+        let name = self.name.replace("ink_images", "ink_pictures");
+        name.strip_suffix("_sd").map_or(name.clone(), |stem| format!("{stem}_deviation"))
+    }
 }
 
 /// A row for each corner.
@@ -83,7 +89,7 @@ pub(super) const CORNERS: [Column; 17] = [
 ];
 
 /// A row for each image.
-pub(super) const PICTURES: [Column; 25] = [
+pub(super) const IMAGES: [Column; 25] = [
     column("image", Kind::Text),
     column("width", Kind::Signed).gaps(),
     column("height", Kind::Signed).gaps(),
@@ -96,15 +102,15 @@ pub(super) const PICTURES: [Column; 25] = [
     column("tone_black", Kind::Real).gaps().extra(),
     column("tone_white", Kind::Real).gaps().extra(),
     column("tone_kappa", Kind::Real).gaps().extra(),
-    column("tone_kappa_deviation", Kind::Real).gaps().extra(),
+    column("tone_kappa_sd", Kind::Real).gaps().extra(),
     column("tone_kappa_odd", Kind::Real).gaps().extra(),
     column("tone_used", Kind::Flag).gaps().extra(),
     column("ink_edges", Kind::Real).gaps(),
-    column("ink_edges_deviation", Kind::Real).gaps(),
+    column("ink_edges_sd", Kind::Real).gaps(),
     column("ink_um", Kind::Real).gaps(),
-    column("ink_um_deviation", Kind::Real).gaps(),
+    column("ink_um_sd", Kind::Real).gaps(),
     column("ink_used", Kind::Flag).gaps(),
-    column("ink_pictures", Kind::Signed).gaps(),
+    column("ink_images", Kind::Signed).gaps(),
     column("exif_orientation", Kind::Signed).gaps().extra(),
     column("damage", Kind::Text).gaps().extra(),
     column("error", Kind::Text).gaps().extra(),

@@ -5,7 +5,7 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-use super::{CORNERS, Contents, EXTENSION, PICTURES, Read, Reader, TableError};
+use super::{CORNERS, Contents, EARLIER_IMAGES, EXTENSION, IMAGES, Read, Reader, TableError};
 use crate::limits::{Limits, ReadError};
 
 /// Error of reading files of tables.
@@ -53,9 +53,10 @@ pub fn is_named(path: &Path) -> bool {
 /// Returns an error if a folder cannot be listed.
 pub fn files(folder: &Path) -> Result<Vec<PathBuf>, FolderError> {
     let mut files = named_in(folder)?;
-    let [corners, pictures] = [CORNERS, PICTURES].map(|table| folder.join(table));
-    if pictures.is_dir() {
-        let done = named_in(&pictures)?;
+    let corners = folder.join(CORNERS);
+    let images = [IMAGES, EARLIER_IMAGES].map(|table| folder.join(table));
+    if let Some(images) = images.into_iter().find(|images| images.is_dir()) {
+        let done = named_in(&images)?;
         let names: BTreeSet<&OsStr> = done.iter().filter_map(|file| file.file_name()).collect();
         if corners.is_dir() {
             let is_done =
@@ -82,13 +83,18 @@ fn named_in(folder: &Path) -> Result<Vec<PathBuf>, FolderError> {
     Ok(files)
 }
 
-/// The path of the other table: `pictures` in place of `corners`, or vice versa.
+/// The path of the other table: `images` in place of `corners`, or vice versa.
 pub fn beside(path: &Path) -> Option<PathBuf> {
     let name = path.file_name()?.to_str()?;
     let swapped =
         |from, to| name.contains(from).then(|| path.with_file_name(name.replace(from, to)));
-    let other = swapped(CORNERS, PICTURES).or_else(|| swapped(PICTURES, CORNERS));
-    other.filter(|other| other.is_file())
+    let pairs = [
+        (CORNERS, IMAGES),
+        (IMAGES, CORNERS),
+        (CORNERS, EARLIER_IMAGES),
+        (EARLIER_IMAGES, CORNERS),
+    ];
+    pairs.into_iter().filter_map(|(from, to)| swapped(from, to)).find(|other| other.is_file())
 }
 
 /// Reads tables from their files.
@@ -107,7 +113,7 @@ pub fn read(files: &[PathBuf], limits: &Limits) -> Result<Read, FolderError> {
         contents.push(reader.add(content).map_err(wrong(file))?);
     }
     let first = files.first().map_or(Path::new(""), PathBuf::as_path);
-    for (wanted, lacks) in [(Contents::Pictures, PICTURES), (Contents::Corners, CORNERS)] {
+    for (wanted, lacks) in [(Contents::Images, IMAGES), (Contents::Corners, CORNERS)] {
         if !files.is_empty() && !contents.contains(&wanted) {
             return Err(FolderError::Alone { path: first.to_owned(), lacks });
         }

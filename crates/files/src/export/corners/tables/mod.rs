@@ -1,5 +1,5 @@
 //! Detections of many images as two Parquet tables, and back: `corners`, with a row for each corner, and
-//! `pictures`, with a row for each image (`docs/formats.md`, “Tables”).
+//! `images`, with a row for each image (`docs/formats.md`, “Tables”).
 //!
 //! They contain all that a calibration needs. Individual tags and the duration of each stage are only in the JSON of a
 //! [detection](super::detection).
@@ -9,10 +9,10 @@
 //!
 //! ```
 //! use deltille_core::detection::Detection;
-//! use deltille_files::export::tables::{Picture, Reader, Writer};
+//! use deltille_files::export::tables::{ImageRecord, Reader, Writer};
 //! use deltille_files::limits::Limits;
 //!
-//! let picture = Picture::of(&Detection::new("desk.png", [640, 480], Vec::new()));
+//! let picture = ImageRecord::of(&Detection::new("desk.png", [640, 480], Vec::new()));
 //! let mut writer = Writer::new(Vec::new(), Vec::new(), &[])?;
 //! writer.push(&picture)?;
 //! let [corners, pictures] = writer.finish()?;
@@ -20,7 +20,7 @@
 //! let mut reader = Reader::new(Limits::default());
 //! reader.add(corners)?;
 //! reader.add(pictures)?;
-//! assert_eq!(reader.finish()?.pictures, [picture]);
+//! assert_eq!(reader.finish()?.images, [picture]);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -40,7 +40,7 @@ pub use write::Writer;
 /// File names of the two tables in a folder, without extension.
 pub const CORNERS: &str = "corners";
 /// See [`CORNERS`].
-pub const PICTURES: &str = "pictures";
+pub const IMAGES: &str = "images";
 /// The extension of both.
 pub const EXTENSION: &str = "parquet";
 
@@ -48,11 +48,15 @@ pub const EXTENSION: &str = "parquet";
 /// programs have no schema and are recognised by their columns.
 const SCHEMA: &str = "deltille.schema";
 const CORNERS_SCHEMA: &str = "deltille/corners/1";
-const PICTURES_SCHEMA: &str = "deltille/pictures/1";
+const IMAGES_SCHEMA: &str = "deltille/images/1";
+
+/// Names of the table of images and of its schema before version 0.1; readers accept them.
+const EARLIER_IMAGES: &str = "pictures";
+const EARLIER_IMAGES_SCHEMA: &str = "deltille/pictures/1";
 
 /// The result of an image.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Picture {
+pub struct ImageRecord {
     /// Its name, unique in a table, by which corners and images are joined.
     pub image: String,
     /// Number of tags that were read in it.
@@ -61,7 +65,7 @@ pub struct Picture {
     pub found: Result<Detection, String>,
 }
 
-impl Picture {
+impl ImageRecord {
     /// The result of an image with a detection.
     pub fn of(found: &Detection) -> Self {
         let mut found = found.clone();
@@ -89,7 +93,7 @@ pub enum TableError {
     File(String),
     /// The file contains another table.
     #[error(
-        "neither a `corners` nor a `pictures` table: it has no column `{0}`; use the files that \
+        "neither a `corners` nor a `images` table: it has no column `{0}`; use the files that \
          `deltille detect --format parquet` wrote"
     )]
     Other(&'static str),
@@ -124,7 +128,7 @@ pub enum TableError {
     },
     /// The rows of an image contradict each other.
     #[error("image {image}: {problem}")]
-    Picture {
+    ImageRecord {
         /// The image.
         image: String,
         /// The problem.

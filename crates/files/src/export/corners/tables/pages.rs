@@ -4,7 +4,7 @@
 //! kind, the number of values and their encoding.
 
 /// Maximum nesting depth of structs in a header; valid headers have three levels.
-const MOST_DEPTH: u32 = 8;
+const MAX_DEPTH: u32 = 8;
 
 /// Supported encodings: their decoders allocate no more than the size of the page. Encodings that begin with a count of
 /// differences may allocate more.
@@ -104,7 +104,7 @@ fn next_field(bytes: &mut &[u8], field: &mut i64) -> Option<Option<u8>> {
 }
 
 fn skip(bytes: &mut &[u8], kind: u8, depth: u32) -> Option<()> {
-    if depth > MOST_DEPTH {
+    if depth > MAX_DEPTH {
         return None;
     }
     match kind {

@@ -16,7 +16,9 @@ use serde_json::{Map, Value};
 
 use super::column::{self, Cell, Column, Kind};
 use super::write::kind_name;
-use super::{CORNERS_SCHEMA, PICTURES_SCHEMA, Picture, SCHEMA, TableError};
+use super::{
+    CORNERS_SCHEMA, EARLIER_IMAGES_SCHEMA, IMAGES_SCHEMA, ImageRecord, SCHEMA, TableError,
+};
 use crate::export::corners::detection;
 use crate::limits::{self, Broken, Kind as Limit, Limits};
 use deltille_core::detection::{Detection, Grid, GridCorner, InkEstimate, Reason, ToneEstimate};
@@ -31,10 +33,10 @@ const BATCH: usize = 4096;
 
 /// Approximate memory of a row, bytes. Repeated values take less in a file.
 const BYTES_PER_CORNER: u64 = 32;
-const BYTES_PER_PICTURE: u64 = 200;
+const BYTES_PER_IMAGE: u64 = 200;
 
 /// Maximum size of a text, for example the path of an image, bytes.
-const MOST_TEXT: usize = 10_000;
+const MAX_TEXT: usize = 10_000;
 
 /// The table that a file contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,7 +44,7 @@ pub enum Contents {
     /// A row for each corner.
     Corners,
     /// A row for each image.
-    Pictures,
+    Images,
 }
 
 /// Reads tables. Each may consist of several files, in any order.
@@ -56,7 +58,7 @@ pub struct Reader {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Read {
     /// The images, in the order of their first occurrence.
-    pub pictures: Vec<Picture>,
+    pub images: Vec<ImageRecord>,
     /// Number of images with fewer corners than their table states.
     pub short: usize,
 }
@@ -64,8 +66,8 @@ pub struct Read {
 /// The data of an image read so far.
 struct Seen {
     image: String,
-    picture: Option<Picture>,
-    /// Its number of corners in the `pictures` table.
+    picture: Option<ImageRecord>,
+    /// Its number of corners in the `images` table.
     corners: Option<u32>,
     grids: BTreeMap<u32, Grid>,
 }
@@ -92,7 +94,7 @@ impl Reader {
         let contents = contents(metadata)?;
         let (columns, per_row) = match contents {
             Contents::Corners => (&column::CORNERS[..], BYTES_PER_CORNER),
-            Contents::Pictures => (&column::PICTURES[..], BYTES_PER_PICTURE),
+            Contents::Images => (&column::IMAGES[..], BYTES_PER_IMAGE),
         };
         let places = places(metadata, columns)?;
         let mut budget = Budget { left: self.limits.max_bytes, limits: self.limits };
@@ -130,7 +132,7 @@ impl Reader {
                     let row = Row { number, columns, cells: &batch, row };
                     match contents {
                         Contents::Corners => self.add_corner(&row, &mut budget)?,
-                        Contents::Pictures => self.add_picture(&row, &mut budget)?,
+                        Contents::Images => self.add_picture(&row, &mut budget)?,
                     }
                 }
             }
@@ -146,7 +148,7 @@ impl Reader {
         let place = match last.or_else(|| self.index.get(image).copied()) {
             Some(place) => place,
             None => {
-                budget.spend(BYTES_PER_PICTURE + 2 * image.len() as u64)?;
+                budget.spend(BYTES_PER_IMAGE + 2 * image.len() as u64)?;
                 self.index.insert(image.to_owned(), self.seen.len());
                 let image = image.to_owned();
                 self.seen.push(Seen {
@@ -196,7 +198,7 @@ impl Reader {
         let image = row.text(0)?.ok_or_else(|| row.missing(0))?;
         let seen = self.seen(image, budget)?;
         if !seen.grids.contains_key(&index) {
-            budget.spend(BYTES_PER_PICTURE + target.map_or(0, |target| target.len() as u64))?;
+            budget.spend(BYTES_PER_IMAGE + target.map_or(0, |target| target.len() as u64))?;
         }
         let grid = seen.grids.entry(index).or_insert_with(|| Grid {
             kind,
@@ -254,10 +256,10 @@ impl Reader {
         // Reasons take more memory than their text.
         budget.spend(image.len() as u64 + 8 * spent)?;
         let seen = self.seen(image, budget)?;
-        let picture = Picture { image: image.to_owned(), tags, found };
+        let picture = ImageRecord { image: image.to_owned(), tags, found };
         if seen.picture.replace(picture).is_some() {
-            let problem = "it is listed twice in the `pictures` table".to_owned();
-            return Err(TableError::Picture { image: image.to_owned(), problem });
+            let problem = "it is listed twice in the `images` table".to_owned();
+            return Err(TableError::ImageRecord { image: image.to_owned(), problem });
         }
         seen.corners = corners;
         Ok(())
@@ -266,15 +268,15 @@ impl Reader {
     /// Returns the images with their corners, sorted by row and column within each grid.
     ///
     /// # Errors
-    /// Returns an error if corners belong to an image that is not in the `pictures` table or could not be read, or if the corners of
+    /// Returns an error if corners belong to an image that is not in the `images` table or could not be read, or if the corners of
     /// an image contradict each other.
     pub fn finish(self) -> Result<Read, TableError> {
-        let (mut pictures, mut short) = (Vec::with_capacity(self.seen.len()), 0);
+        let (mut images, mut short) = (Vec::with_capacity(self.seen.len()), 0);
         for Seen { image, picture, corners, grids } in self.seen {
-            let wrong = |problem: String| TableError::Picture { image: image.clone(), problem };
+            let wrong = |problem: String| TableError::ImageRecord { image: image.clone(), problem };
             let Some(mut picture) = picture else {
                 return Err(wrong(
-                    "it has corners, but it is not in the `pictures` table".to_owned(),
+                    "it has corners, but it is not in the `images` table".to_owned(),
                 ));
             };
             let count: usize = grids.values().map(|grid| grid.corners.len()).sum();
@@ -296,9 +298,9 @@ impl Reader {
                 }
                 Err(_) => {}
             }
-            pictures.push(picture);
+            images.push(picture);
         }
-        Ok(Read { pictures, short })
+        Ok(Read { images, short })
     }
 }
 
@@ -313,13 +315,14 @@ fn contents(metadata: &ParquetMetaData) -> Result<Contents, TableError> {
     let schema = metadata.file_metadata().schema_descr();
     let has = |name: &str| schema.columns().iter().any(|column| column.path().string() == name);
     let (contents, reads) = match (has("width"), has("x")) {
-        (true, _) => (Contents::Pictures, PICTURES_SCHEMA),
+        (true, _) => (Contents::Images, IMAGES_SCHEMA),
         (_, true) => (Contents::Corners, CORNERS_SCHEMA),
         _ => return Err(TableError::Other("x` or `width")),
     };
     let stated = metadata.file_metadata().key_value_metadata().into_iter().flatten();
     let stated = stated.filter(|pair| pair.key == SCHEMA).find_map(|pair| pair.value.as_deref());
     match stated {
+        Some(EARLIER_IMAGES_SCHEMA) if reads == IMAGES_SCHEMA => Ok(contents),
         Some(found) if found != reads => {
             let found: String = found.chars().take(100).collect();
             Err(TableError::Schema { found, reads })
@@ -338,7 +341,8 @@ fn places(
         let wrong =
             |problem: &str| TableError::Column { column: column.name, problem: problem.to_owned() };
         let all = schema.columns().iter();
-        match all.clone().position(|found| found.path().string() == column.name) {
+        let is_named = |name: &str| all.clone().position(|found| found.path().string() == name);
+        match is_named(column.name).or_else(|| is_named(&column.earlier_name())) {
             Some(place) => {
                 let found = schema.column(place);
                 let is_flat = found.max_rep_level() == 0 && found.max_def_level() <= 1;
@@ -516,8 +520,8 @@ impl<'a> Row<'a> {
     fn text(&self, at: usize) -> Result<Option<&'a str>, TableError> {
         match self.cell(at) {
             Cell::None => Ok(None),
-            Cell::Text(bytes) if bytes.len() > MOST_TEXT => {
-                Err(self.wrong(at, format!("text with more than {MOST_TEXT} bytes")))
+            Cell::Text(bytes) if bytes.len() > MAX_TEXT => {
+                Err(self.wrong(at, format!("text with more than {MAX_TEXT} bytes")))
             }
             Cell::Text(bytes) => {
                 let text = str::from_utf8(bytes.data());
@@ -563,11 +567,11 @@ impl<'a> Row<'a> {
     }
 
     fn tone(&self) -> Result<Option<ToneEstimate>, TableError> {
-        self.estimate(9, &["black", "white", "kappa", "kappa_deviation", "kappa_odd", "used"])
+        self.estimate(9, &["black", "white", "kappa", "kappa_sd", "kappa_odd", "used"])
     }
 
     fn ink(&self) -> Result<Option<InkEstimate>, TableError> {
-        let fields = ["edges", "edges_deviation", "um", "um_deviation", "used", "pictures"];
+        let fields = ["edges", "edges_sd", "um", "um_sd", "used", "images"];
         self.estimate(15, &fields)
     }
 

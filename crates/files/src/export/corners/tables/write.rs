@@ -15,7 +15,7 @@ use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::types::{ColumnPath, Type};
 
 use super::column::{self, Cell, Column, Kind};
-use super::{CORNERS_SCHEMA, PICTURES_SCHEMA, Picture, SCHEMA, TableError};
+use super::{CORNERS_SCHEMA, IMAGES_SCHEMA, ImageRecord, SCHEMA, TableError};
 use crate::export::GENERATOR;
 use deltille_core::detection::Detection;
 use deltille_core::lattice::GridKind;
@@ -33,7 +33,7 @@ impl From<ParquetError> for TableError {
 /// Writes both tables, image by image.
 pub struct Writer<W: Write + Send> {
     corners: Table<W>,
-    pictures: Table<W>,
+    images: Table<W>,
     places: HashMap<Label, DVec3>,
     /// Whether grids name their targets.
     are_several: bool,
@@ -47,7 +47,7 @@ impl<W: Write + Send> Writer<W> {
     ///
     /// # Errors
     /// Returns an error if the tables cannot be written.
-    pub fn new(corners: W, pictures: W, targets: &[Target]) -> Result<Self, TableError> {
+    pub fn new(corners: W, images: W, targets: &[Target]) -> Result<Self, TableError> {
         let are_several = targets.len() > 1;
         let places = targets.iter().flat_map(|target| {
             let name = if are_several { target.name.to_string() } else { String::new() };
@@ -69,7 +69,7 @@ impl<W: Write + Send> Writer<W> {
         Ok(Self {
             places: places.collect(),
             corners: Table::new(corners, CORNERS_SCHEMA, &column::CORNERS)?,
-            pictures: Table::new(pictures, PICTURES_SCHEMA, &column::PICTURES)?,
+            images: Table::new(images, IMAGES_SCHEMA, &column::IMAGES)?,
             are_several,
         })
     }
@@ -78,11 +78,11 @@ impl<W: Write + Send> Writer<W> {
     ///
     /// # Errors
     /// Returns an error if the tables cannot be written.
-    pub fn push(&mut self, picture: &Picture) -> Result<(), TableError> {
+    pub fn push(&mut self, picture: &ImageRecord) -> Result<(), TableError> {
         if let Ok(found) = &picture.found {
             self.push_corners(&picture.image, found)?;
         }
-        self.pictures.push(picture_row(picture))
+        self.images.push(picture_row(picture))
     }
 
     fn push_corners(&mut self, image: &str, found: &Detection) -> Result<(), TableError> {
@@ -127,7 +127,7 @@ impl<W: Write + Send> Writer<W> {
     /// # Errors
     /// Returns an error if the tables cannot be written.
     pub fn finish(self) -> Result<[W; 2], TableError> {
-        Ok([self.corners.finish()?, self.pictures.finish()?])
+        Ok([self.corners.finish()?, self.images.finish()?])
     }
 }
 
@@ -159,7 +159,7 @@ fn flag(value: Option<bool>) -> Cell {
     value.map_or(Cell::None, Cell::Flag)
 }
 
-fn picture_row(picture: &Picture) -> [Cell; column::PICTURES.len()] {
+fn picture_row(picture: &ImageRecord) -> [Cell; column::IMAGES.len()] {
     let found = picture.found.as_ref().ok();
     let count = |of: fn(&Detection) -> usize| whole(found.map(|found| of(found) as u32));
     let reasons = found.map(|found| &found.reasons).filter(|reasons| !reasons.is_empty());
@@ -187,15 +187,15 @@ fn picture_row(picture: &Picture) -> [Cell; column::PICTURES.len()] {
         real(tone.map(|tone| tone.black)),
         real(tone.map(|tone| tone.white)),
         real(tone.map(|tone| tone.kappa)),
-        real(tone.map(|tone| tone.kappa_deviation)),
+        real(tone.map(|tone| tone.kappa_sd)),
         real(tone.map(|tone| tone.kappa_odd)),
         flag(tone.map(|tone| tone.used)),
         real(ink.map(|ink| ink.edges)),
-        real(ink.map(|ink| ink.edges_deviation)),
+        real(ink.map(|ink| ink.edges_sd)),
         real(ink.and_then(|ink| ink.um)),
-        real(ink.and_then(|ink| ink.um_deviation)),
+        real(ink.and_then(|ink| ink.um_sd)),
         flag(ink.map(|ink| ink.used)),
-        whole(ink.map(|ink| ink.pictures)),
+        whole(ink.map(|ink| ink.images)),
         whole(file.and_then(|file| file.exif_orientation)),
         file.and_then(|file| file.damage.as_deref()).map_or(Cell::None, text),
         picture.found.as_ref().err().map_or(Cell::None, |why| text(why)),

@@ -1,11 +1,11 @@
 //! Sentences of diagnoses, for the terminal, the report page and files.
 
 use super::diagnosis::Diagnosis;
-use super::model_selection::{FOREIGN_PART, Instead, Remedy};
+use super::model_selection::{Alternative, FOREIGN_PART, Remedy};
 use super::one_state::{BoardStretch, CameraChange, ChangedIntrinsic, RollingShutter};
-use crate::adjust::finding::{Finding, Moved, Shared};
+use crate::adjust::finding::{Finding, Moved, OutlierPattern};
 use crate::adjust::lack_of_fit::LackOfFit;
-use crate::estimate::target_map::LEAST_TO_MEASURE;
+use crate::estimate::target_map::MIN_VIEWS_TO_MEASURE;
 use crate::estimate::values::Estimate;
 use crate::input::panel::PanelRef;
 use crate::model::Model;
@@ -26,14 +26,14 @@ const GIVEN_CAMERA: &str =
 /// Formats the diagnoses of an estimate as sentences, without initial capital and final full stop.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
-pub struct Words<'a> {
+pub struct Messages<'a> {
     /// The diagnosed estimate.
     pub estimate: &'a Estimate,
     /// The measured print scale along x and y, if it was given.
     pub print_scale: Option<[f64; 2]>,
 }
 
-impl<'a> Words<'a> {
+impl<'a> Messages<'a> {
     /// Creates the formatter for an estimate and its print scale, if one was given.
     pub fn new(estimate: &'a Estimate, print_scale: Option<[f64; 2]>) -> Self {
         Self { estimate, print_scale }
@@ -42,7 +42,7 @@ impl<'a> Words<'a> {
     /// Returns the sentence of a diagnosis.
     pub fn sentence(&self, diagnosis: &Diagnosis) -> String {
         match diagnosis {
-            Diagnosis::ForeignCamera { camera, rms_px } => self.of_camera(
+            Diagnosis::WrongCamera { camera, rms_px } => self.of_camera(
                 *camera,
                 format!(
                     "with this camera the residuals are {rms_px:.1} px RMS, more than {} % of the image width: \
@@ -50,20 +50,20 @@ impl<'a> Words<'a> {
                     100.0 * FOREIGN_PART
                 ),
             ),
-            Diagnosis::AbsurdFit { camera, rms_px } => self.of_camera(
+            Diagnosis::UnusableFit { camera, rms_px } => self.of_camera(
                 *camera,
                 does_not_fit(self.model(*camera), *rms_px),
             ),
-            Diagnosis::ManyLeftOut { left_out, all } => self.many_left_out(*left_out, *all),
-            Diagnosis::ManyPanelsLeftOut { left_out, all } => format!(
-                "{left_out} of {all} corners (more than a fifth) were left out with their panels, so the result rests \
+            Diagnosis::ManyExcluded { excluded, all } => self.many_excluded(*excluded, *all),
+            Diagnosis::ManyPanelsExcluded { excluded, all } => format!(
+                "{excluded} of {all} corners (more than a fifth) were excluded with their panels, so the result rests \
                  on the others only; the size or the labels of a board differ from its description: measure an edge of \
                  each board"
             ),
-            Diagnosis::OtherMinimum { camera, other, rms_px } => self.other_minimum(*camera, other, *rms_px),
-            Diagnosis::Late { camera, frames } => self.late(*camera, *frames),
+            Diagnosis::SecondMinimum { camera, other, rms_px } => self.second_minimum(*camera, other, *rms_px),
+            Diagnosis::DelayedCamera { camera, frames } => self.late(*camera, *frames),
             Diagnosis::LabelsRotated { camera, rotation } => self.labels_rotated(*camera, rotation),
-            Diagnosis::LabelsOpen { degrees } => format!(
+            Diagnosis::AmbiguousLabels { degrees } => format!(
                 "the board has no tags and looks the same after a rotation by {degrees}°: its estimated corners or shape \
                  are right only if it was the same way up in all views"
             ),
@@ -75,8 +75,8 @@ impl<'a> Words<'a> {
                 self.of_camera(*camera, rolling_shutter(shutter, views))
             }
             Diagnosis::StretchedBoard { stretch, .. } => stretched(stretch),
-            Diagnosis::LensEnds { camera, end } => self.of_camera(*camera, end.to_string()),
-            Diagnosis::GrossErrors(finding) => self.finding(finding),
+            Diagnosis::NonMonotonicLens { camera, end } => self.of_camera(*camera, end.to_string()),
+            Diagnosis::CommonOutliers(finding) => self.finding(finding),
             Diagnosis::Remedied { camera, remedy } => self.remedied(*camera, remedy),
             Diagnosis::LackOfFit(misfit) => self.lack_of_fit(misfit),
             Diagnosis::PoorFit { camera, rms_px } => self.of_camera(
@@ -92,13 +92,13 @@ impl<'a> Words<'a> {
         }
     }
 
-    fn many_left_out(&self, left_out: usize, all: usize) -> String {
+    fn many_excluded(&self, excluded: usize, all: usize) -> String {
         let (what, lens) = match self.estimate.cameras.as_slice() {
             [only] => ("views", other_lens(only.model)),
             _ => ("frames", "a camera moved, or images were not taken at the same time".to_owned()),
         };
         format!(
-            "{left_out} of {all} {what} (more than a fifth) were left out, so the result rests on the others \
+            "{excluded} of {all} {what} (more than a fifth) were excluded, so the result rests on the others \
              only: {lens}, or the labels of the excluded {what} are wrong"
         )
     }
@@ -114,7 +114,7 @@ impl<'a> Words<'a> {
     }
 
     fn labels_rotated(&self, camera: usize, rotation: &LabelRotation) -> String {
-        let LabelRotation { degrees, frames, of, is_sure } = *rotation;
+        let LabelRotation { degrees, frames, of, is_confirmed } = *rotation;
         let name = &self.estimate.cameras[camera].name;
         let board =
             format!("the board has no tags and looks the same after a rotation by {degrees}°");
@@ -122,7 +122,7 @@ impl<'a> Words<'a> {
             0 => "were kept as detected".to_owned(),
             _ => format!("were rotated in {frames} of {}", counted(of, "frame")),
         };
-        match is_sure {
+        match is_confirmed {
             true => format!(
                 "camera {name}: {board}; its labels {labels}, because only then do the cameras agree on the pose of \
                  the board"
@@ -134,7 +134,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    fn other_minimum(&self, camera: usize, other: &Camera, rms_px: f64) -> String {
+    fn second_minimum(&self, camera: usize, other: &Camera, rms_px: f64) -> String {
         let found = &self.estimate.cameras[camera];
         let focal = |of: &Camera| of.focal_px.x;
         let text = format!(
@@ -150,7 +150,7 @@ impl<'a> Words<'a> {
 
     /// Returns the sentence of a finding: the panel, view, region or camera that outliers have in common.
     pub fn finding(&self, finding: &Finding) -> String {
-        let Finding { shared, outliers, corners, left_out } = finding;
+        let Finding { pattern, outliers, corners, is_excluded } = finding;
         let of = |camera: &usize, what: String| match self.estimate.camera_name(*camera) {
             Some(name) => format!("camera {name}, {what}"),
             None => what,
@@ -159,16 +159,16 @@ impl<'a> Words<'a> {
             1 => format!("1 of {} is an outlier", counted(*corners, "corner")),
             n => format!("{n} of {} are outliers", counted(*corners, "corner")),
         };
-        let text = match shared {
-            Shared::Beyond { camera, view } => {
+        let text = match pattern {
+            OutlierPattern::OutsideImage { camera, view } => {
                 let corners = counted(*corners, "corner");
                 let who = of(camera, format!("view {view}"));
-                return format!("{who}: {outliers} of {corners} far outside the image; left out");
+                return format!("{who}: {outliers} of {corners} far outside the image; excluded");
             }
-            Shared::Panel { panel, moved } => {
+            OutlierPattern::Panel { panel, moved } => {
                 let why = match moved {
-                    Some(Moved { by_mm, turned_rad }) => {
-                        let degrees = turned_rad.to_degrees();
+                    Some(Moved { by_mm, rotation_rad }) => {
+                        let degrees = rotation_rad.to_degrees();
                         let turned = match degrees >= TURNED_DEG {
                             true => format!(" and rotated by {degrees:.1}°"),
                             false => String::new(),
@@ -186,17 +186,17 @@ impl<'a> Words<'a> {
                 };
                 format!("panel {panel}: {count}: {why}")
             }
-            Shared::PanelInView { panel, camera, view, off_px } => {
+            OutlierPattern::PanelInView { panel, camera, view, off_px } => {
                 let who = of(camera, format!("view {view}, panel {panel}"));
                 format!(
                     "{who}: its corners are off by {off_px:.1} px, while the rest of the view fits: wrong labels, \
                      or the size of this or another board differs from its description"
                 )
             }
-            Shared::View { camera, view } => {
+            OutlierPattern::View { camera, view } => {
                 format!("{}: {count}: inspect the image", of(camera, format!("view {view}")))
             }
-            Shared::Region { camera, from_px: from, to_px: to } => {
+            OutlierPattern::Region { camera, from_px: from, to_px: to } => {
                 let where_ =
                     format!("x {:.0} to {:.0}, y {:.0} to {:.0} px", from.x, to.x, from.y, to.y);
                 format!(
@@ -205,22 +205,26 @@ impl<'a> Words<'a> {
                     of(camera, where_)
                 )
             }
-            Shared::Camera { camera } => {
+            OutlierPattern::Camera { camera } => {
                 format!("{}: {count}", of(camera, "all views".to_owned()))
             }
         };
-        if *left_out { text + "; left out" } else { text }
+        if *is_excluded { text + "; excluded" } else { text }
     }
 
-    fn remedied(&self, camera: usize, Remedy { instead, from_px, to_px }: &Remedy) -> String {
+    fn remedied(&self, camera: usize, Remedy { alternative, from_px, to_px }: &Remedy) -> String {
         let model = self.model(camera);
-        let (cause, found) = match *instead {
-            Instead::Shape => (self.board(model), "estimating the shape of the board".to_owned()),
-            Instead::Panels => {
+        let (cause, found) = match *alternative {
+            Alternative::Shape => {
+                (self.board(model), "estimating the shape of the board".to_owned())
+            }
+            Alternative::Panels => {
                 (self.moved_panels(None), "estimating the pose of every panel".to_owned())
             }
-            Instead::Camera => (GIVEN_CAMERA.to_owned(), "estimating the intrinsics".to_owned()),
-            Instead::Model(other) => (
+            Alternative::Camera => {
+                (GIVEN_CAMERA.to_owned(), "estimating the intrinsics".to_owned())
+            }
+            Alternative::Model(other) => (
                 match model {
                     Some(model) => {
                         format!("`{model}` does not fit the lens: use {CalibrateModel} {other}")
@@ -315,11 +319,11 @@ impl<'a> Words<'a> {
     /// Advice to measure the position of every corner, or to take more views first.
     fn measuring(&self) -> String {
         match self.estimate.views_of_a_corner() {
-            views if views >= LEAST_TO_MEASURE => {
+            views if views >= MIN_VIEWS_TO_MEASURE => {
                 format!("measure the position of every corner with {CalibrationMeasureTarget}")
             }
             views => format!(
-                "take at least {LEAST_TO_MEASURE} views of every corner (now {views}) to measure their positions \
+                "take at least {MIN_VIEWS_TO_MEASURE} views of every corner (now {views}) to measure their positions \
                  with {CalibrationMeasureTarget}"
             ),
         }

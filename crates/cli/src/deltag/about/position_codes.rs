@@ -4,13 +4,13 @@ use serde_json::json;
 
 use crate::output::{self, ResultFormat, say};
 use deltille::family::Family;
-use deltille::family::places::{BITS, BOARDS, PLACES, PatchCertificate, certify_places};
+use deltille::family::positions::{BITS, BOARDS, POSITIONS, PatchCertificate, certify_positions};
 use deltille_core::words::counted;
 
 /// Prints a description of the position codes.
 pub fn about(family: &Family, result_format: ResultFormat) -> anyhow::Result<()> {
     if result_format.is_json() {
-        let patches = certify_places().into_iter().map(|certificate| {
+        let patches = certify_positions().into_iter().map(|certificate| {
             let PatchCertificate { tiles, forms, least, .. } = certificate;
             json!({
                 "tiles": tiles, "forms": forms, "from_places": least.places,
@@ -19,17 +19,17 @@ pub fn about(family: &Family, result_format: ResultFormat) -> anyhow::Result<()>
         });
         return output::print_json(&json!({
             "name": family.name(), "fingerprint": family.fingerprint(), "bits": BITS,
-            "boards": BOARDS, "places": PLACES, "patches": patches.collect::<Vec<_>>(),
+            "boards": BOARDS, "positions": POSITIONS, "patches": patches.collect::<Vec<_>>(),
         }));
     }
     say!("{}, fingerprint {}", family.name(), family.fingerprint());
     say!("  position codes: any 3 × 4 adjacent upright tiles identify their position on the board");
     say!("  cells           {BITS} in a tile");
     say!("  boards          {BOARDS}, with ids from 0");
-    say!("  positions       {PLACES} on each board, repeating after 256 edges");
+    say!("  positions       {POSITIONS} on each board, repeating after 256 edges");
     say!("  minimum distance between any two patches, in any position and rotation");
     say!("    tiles  forms  cells  corrected errors, and distance to mirrored patches");
-    for certificate in certify_places() {
+    for certificate in certify_positions() {
         say!("{}", line(&certificate));
     }
     say!("  to print        deltille board --dense");
@@ -49,9 +49,9 @@ fn line(certificate: &PatchCertificate) -> String {
 
 /// Checks the claimed distances; returns whether they are met, and a description.
 pub fn verify(family: &Family) -> (bool, String) {
-    let certificates = certify_places();
+    let certificates = certify_positions();
     let cells = |c: &PatchCertificate| c.least.places.min(c.least.turned);
-    if let Some(broken) = certificates.iter().find(|certificate| !certificate.holds()) {
+    if let Some(broken) = certificates.iter().find(|certificate| !certificate.is_valid()) {
         let PatchCertificate { tiles, claimed, .. } = broken;
         let found = cells(broken);
         return (
@@ -67,7 +67,7 @@ pub fn verify(family: &Family) -> (bool, String) {
     let distances = distances.collect::<Vec<_>>().join(", ");
     let mirrored = certificates.last().map_or(0, |certificate| certificate.least.mirrored);
     let what = format!(
-        "{PLACES} positions on each of {BOARDS} boards; minimum distance between patches in any rotation: {distances}, \
+        "{POSITIONS} positions on each of {BOARDS} boards; minimum distance between patches in any rotation: {distances}, \
          the last {mirrored} from mirrored ones; fingerprint {}",
         family.fingerprint()
     );

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use deltille::calibrate::{
     Calibration, CalibrationError, CameraViews, Diagnosis, Estimate, Finding, LackOfFit, Model,
-    Observation, PanelPlace, PanelRef, Shared, Sighting, View,
+    Observation, OutlierPattern, PanelPrior, PanelRef, Sighting, View,
 };
 use deltille::camera::{Camera, Lens, Pose};
 use deltille::family::Family;
@@ -275,7 +275,8 @@ const OF_SOLIDS: [Wrong; 4] =
 
 /// Checks the findings and excluded views for a fault.
 fn check_named(found: &Estimate, target: &Target, wrong: Wrong, case: &str) {
-    let shared: Vec<&Shared> = found.findings.iter().map(|finding| &finding.shared).collect();
+    let shared: Vec<&OutlierPattern> =
+        found.findings.iter().map(|finding| &finding.pattern).collect();
     let is_solid = target.panels.len() > 1;
     match wrong {
         Wrong::Nothing => {
@@ -289,8 +290,8 @@ fn check_named(found: &Estimate, target: &Target, wrong: Wrong, case: &str) {
         Wrong::Endless => {
             let of_views: Vec<&str> = shared
                 .iter()
-                .map(|shared| match shared {
-                    Shared::Beyond { view, .. } => view.as_str(),
+                .map(|pattern| match pattern {
+                    OutlierPattern::OutsideImage { view, .. } => view.as_str(),
                     other => panic!("{case}: {other:?}"),
                 })
                 .collect();
@@ -299,10 +300,10 @@ fn check_named(found: &Estimate, target: &Target, wrong: Wrong, case: &str) {
         Wrong::Displaced(mm) => {
             let [
                 Finding {
-                    shared: Shared::Panel { panel, moved: Some(moved) },
+                    pattern: OutlierPattern::Panel { panel, moved: Some(moved) },
                     outliers,
                     corners,
-                    left_out: true,
+                    is_excluded: true,
                     ..
                 },
             ] = found.findings.as_slice()
@@ -325,7 +326,10 @@ fn check_named(found: &Estimate, target: &Target, wrong: Wrong, case: &str) {
             );
         }
         Wrong::PanelPermuted => {
-            assert!(matches!(shared[..], [Shared::PanelInView { .. }]), "{case}: {shared:?}");
+            assert!(
+                matches!(shared[..], [OutlierPattern::PanelInView { .. }]),
+                "{case}: {shared:?}"
+            );
         }
         _ => {}
     }
@@ -414,7 +418,7 @@ fn outliers_over_twenty_seeds() {
 }
 
 /// Three cameras around an icosahedron, each with its own views of the same frames.
-fn rig(wrong: Wrong, frames: usize, seed: u64) -> (Vec<CameraViews>, Vec<PanelPlace>) {
+fn rig(wrong: Wrong, frames: usize, seed: u64) -> (Vec<CameraViews>, Vec<PanelPrior>) {
     let target = icosahedron();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let camera = camera(RADTAN);
@@ -439,10 +443,10 @@ fn rig(wrong: Wrong, frames: usize, seed: u64) -> (Vec<CameraViews>, Vec<PanelPl
         CameraViews::new(&format!("c{index}"), views, RADTAN)
     });
     let views = views.collect();
-    (views, stated.into_iter().map(PanelPlace::from).collect())
+    (views, stated.into_iter().map(PanelPrior::from).collect())
 }
 
-fn solve_rig(views: &[CameraViews], panels: &[PanelPlace]) -> Result<Estimate, CalibrationError> {
+fn solve_rig(views: &[CameraViews], panels: &[PanelPrior]) -> Result<Estimate, CalibrationError> {
     views.iter().cloned().fold(Calibration::new(panels.iter().copied()), Calibration::with).solve()
 }
 
@@ -450,7 +454,8 @@ fn solve_rig(views: &[CameraViews], panels: &[PanelPlace]) -> Result<Estimate, C
 fn faults_of_a_rig_are_named() {
     let (views, panels) = rig(Wrong::Displaced(0.6), 20, 5);
     let found = solve_rig(&views, &panels).unwrap();
-    let [Finding { shared: Shared::Panel { panel, moved: Some(moved) }, .. }] = found.findings[..]
+    let [Finding { pattern: OutlierPattern::Panel { panel, moved: Some(moved) }, .. }] =
+        found.findings[..]
     else {
         panic!("{:?}", found.findings)
     };
@@ -487,8 +492,8 @@ fn panels_are_not_blamed_for_a_moved_camera() {
 
 /// The panels that the findings name; there must be no other findings.
 fn panels_named(found: &Estimate) -> Vec<usize> {
-    let panels = found.findings.iter().map(|finding| match &finding.shared {
-        Shared::Panel { panel, .. } => panel.index(),
+    let panels = found.findings.iter().map(|finding| match &finding.pattern {
+        OutlierPattern::Panel { panel, .. } => panel.index(),
         other => panic!("{other:?}"),
     });
     panels.collect()

@@ -4,13 +4,13 @@ use std::collections::BTreeSet;
 
 use rayon::prelude::*;
 
-use super::{BITS, DEGREE, MASK, PLACES, cells, id, state, times, unmasked};
+use super::{BITS, DEGREE, MASK, POSITIONS, cells, id, state, times, unmasked};
 use crate::lattice::{Cell, GridKind, Vertex};
 
 /// Minimum number of cells in which a patch of tiles differs from other patches, at any place on any board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
-pub struct PlaceDistances {
+pub struct PositionDistances {
     /// Distance from patches with the same rotation, at another place.
     pub places: u32,
     /// Distance from patches with another rotation, at any place.
@@ -19,7 +19,7 @@ pub struct PlaceDistances {
     pub mirrored: u32,
 }
 
-impl PlaceDistances {
+impl PositionDistances {
     /// Returns the smallest of the three.
     pub fn least(self) -> u32 {
         self.places.min(self.turned).min(self.mirrored)
@@ -36,25 +36,25 @@ pub struct PatchCertificate {
     /// three by four tiles.
     pub forms: usize,
     /// Minimum over all forms.
-    pub least: PlaceDistances,
+    pub least: PositionDistances,
     /// Claimed minimum distance of patches that are not mirrored, in any rotation.
     pub claimed: u32,
 }
 
 impl PatchCertificate {
     /// Returns whether the claim holds.
-    pub fn holds(&self) -> bool {
+    pub fn is_valid(&self) -> bool {
         self.least.places.min(self.least.turned) >= self.claimed
     }
 }
 
 /// Computes the distances of patches of three, four and five tiles, and of three by four.
-pub fn certify_places() -> Vec<PatchCertificate> {
+pub fn certify_positions() -> Vec<PatchCertificate> {
     let connected = [(3, 1), (4, 2), (5, 4)].map(|(tiles, claimed)| (patches(tiles), claimed));
     let sizes = connected.into_iter().chain([(three_by_four(), 26)]);
     let certify = |(forms, claimed): (Vec<Vec<Vertex>>, u32)| {
         let found = forms.iter().filter_map(|patch| distances(patch));
-        let least = found.reduce(|a, b| PlaceDistances {
+        let least = found.reduce(|a, b| PositionDistances {
             places: a.places.min(b.places),
             turned: a.turned.min(b.turned),
             mirrored: a.mirrored.min(b.mirrored),
@@ -78,15 +78,15 @@ fn three_by_four() -> Vec<Vec<Vertex>> {
 }
 
 /// Maximum number of tiles of a patch, whose cells are the bits of a word.
-const MOST_TILES: usize = (u128::BITS / BITS) as usize;
+const MAX_TILES: usize = (u128::BITS / BITS) as usize;
 
 /// Computes the number of cells in which a patch of up to 14 tiles differs from any other of the same form; `None`
 /// for more tiles.
 ///
 /// The result covers all pairs of places of all boards, by minimum weights of linear codes (Brouwer and Zimmermann).
-pub fn distances(tiles: &[Vertex]) -> Option<PlaceDistances> {
+pub fn distances(tiles: &[Vertex]) -> Option<PositionDistances> {
     let [seen, in_mirror] = [false, true].map(|mirrored| Seen::new(tiles, mirrored));
-    if tiles.len() > MOST_TILES {
+    if tiles.len() > MAX_TILES {
         return None;
     }
     let pairs = |a: &Seen, b: &Seen, all: bool| -> u32 {
@@ -100,7 +100,7 @@ pub fn distances(tiles: &[Vertex]) -> Option<PlaceDistances> {
         });
         offsets.map(|offset| least_weight(&generators, offset)).min().unwrap_or(0)
     };
-    Some(PlaceDistances {
+    Some(PositionDistances {
         places: least_weight(&seen.generators, 0),
         turned: pairs(&seen, &seen, false),
         mirrored: pairs(&seen, &in_mirror, true),
@@ -137,7 +137,7 @@ impl Seen {
         let generators = (0..DEGREE).map(|bit| {
             join(&|tile| {
                 let tile = if mirrored { swap(tile) } else { tile };
-                unmasked(times(1 << bit, state(id(0, tile) % PLACES)))
+                unmasked(times(1 << bit, state(id(0, tile) % POSITIONS)))
             })
         });
         let mut masks = [MASK; 3];
@@ -298,8 +298,8 @@ mod tests {
 
     #[test]
     fn patches_are_as_far_apart_as_claimed() {
-        for certificate in certify_places() {
-            assert!(certificate.holds(), "{certificate:?}");
+        for certificate in certify_positions() {
+            assert!(certificate.is_valid(), "{certificate:?}");
         }
         assert_eq!(distances(&rhombus(3, 5)), None);
     }

@@ -31,7 +31,7 @@ mod distances;
 use std::sync::LazyLock;
 
 use crate::lattice::{Dimension, TagCells, Vertex};
-pub use distances::{PatchCertificate, PlaceDistances, certify_places, distances, patches};
+pub use distances::{PatchCertificate, PositionDistances, certify_positions, distances, patches};
 
 /// Name of the family of position codes.
 pub const NAME: &str = "dense9";
@@ -49,12 +49,12 @@ const POLYNOMIAL: u32 = 0x100_0087;
 const SUBFIELD: u32 = 1 << (DEGREE / 3);
 
 /// Number of places on a board, q² + q + 1.
-pub const PLACES: u32 = SUBFIELD * SUBFIELD + SUBFIELD + 1;
+pub const POSITIONS: u32 = SUBFIELD * SUBFIELD + SUBFIELD + 1;
 
 /// Number of boards, q − 1; board ids are smaller.
 pub const BOARDS: u32 = SUBFIELD - 1;
 
-/// φ of the step along a row, in powers of x^(q − 1); coprime with [`PLACES`].
+/// φ of the step along a row, in powers of x^(q − 1); coprime with [`POSITIONS`].
 const STEP: u64 = 23_360;
 
 /// δ of the first cell of each of the three orbits of cells under a rotation, by increasing bit.
@@ -67,7 +67,7 @@ const MASK: u64 = 0b0_0101_0010;
 const ALPHA: u32 = power(2, (SUBFIELD as u64 - 1) * STEP);
 
 /// Element γ.
-const GAMMA: u32 = power(2, PLACES as u64);
+const GAMMA: u32 = power(2, POSITIONS as u64);
 
 /// Returns the product of two elements of the field.
 const fn times(mut a: u32, mut b: u32) -> u32 {
@@ -143,13 +143,13 @@ pub(super) fn cells() -> TagCells {
 /// Since β = α^q, the state of z = col + row · e^(iπ/3) is α^(col + (q + 1) row).
 pub fn id(board: u32, tile: Vertex) -> u32 {
     let along = i64::from(tile.col) + i64::from(SUBFIELD + 1) * i64::from(tile.row);
-    board * PLACES + along.rem_euclid(PLACES.into()) as u32
+    board * POSITIONS + along.rem_euclid(POSITIONS.into()) as u32
 }
 
 /// Returns whether all places are different on a board with these numbers of rows and columns of tiles. Every second
 /// row is shifted by half an edge.
 pub fn are_different(rows: u32, cols: u32) -> bool {
-    let (rows, cols, places) = (i64::from(rows), i64::from(cols), i64::from(PLACES));
+    let (rows, cols, places) = (i64::from(rows), i64::from(cols), i64::from(POSITIONS));
     (0..rows).all(|row| {
         let along = (i64::from(SUBFIELD + 1) * row) % places;
         // Distances in half edges to the tiles of that row with the same code.
@@ -162,7 +162,7 @@ pub fn are_different(rows: u32, cols: u32) -> bool {
 
 /// Returns the state that an id represents.
 fn state(id: u32) -> u32 {
-    times(power(GAMMA, (id / PLACES).into()), power(ALPHA, (id % PLACES).into()))
+    times(power(GAMMA, (id / POSITIONS).into()), power(ALPHA, (id % POSITIONS).into()))
 }
 
 /// Bits by cell: Tr(s δ) is the parity of s and these bits.
@@ -180,7 +180,7 @@ pub fn word(id: u32) -> u64 {
 /// Returns the words of the first board by their ids.
 pub(super) fn first_board() -> Vec<u64> {
     let states = std::iter::successors(Some(1), |&state| Some(times(state, ALPHA)));
-    states.take(PLACES as usize).map(|state| unmasked(state) ^ MASK).collect()
+    states.take(POSITIONS as usize).map(|state| unmasked(state) ^ MASK).collect()
 }
 
 /// Returns the word of a tile in a state, without the mask.
