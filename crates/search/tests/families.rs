@@ -50,7 +50,7 @@ fn families_with_free_cells_decode_without_them() {
     assert!(family.len() >= 30 && family.codes().iter().all(|code| code & free == 0));
     assert_eq!(Family::from_json(&family.to_json()).unwrap(), family);
     assert_ne!(
-        Family::from_json(&family.to_json().replace("\"free\"", "\"fre\"")).ok(),
+        Family::from_json(&family.to_json().replace("\"free\"", "\"hollow\"")).ok(),
         Some(family.clone())
     );
 

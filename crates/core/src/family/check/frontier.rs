@@ -54,7 +54,7 @@ mod tests {
 
     /// The choice for a family's own rule has its codes and rates; stricter rules have fewer codes and lower rates.
     #[test]
-    fn a_familys_own_rule_is_one_of_the_choices() {
+    fn the_own_rule_of_a_family_is_one_of_the_choices() {
         let family = Family::shipped("d36h11").unwrap();
         let choices = rule_choices(family.dimension(), family.distance(), family.codes());
         let rates = family.natural_false_positive_rates().unwrap();
