@@ -117,7 +117,7 @@ def plot(
     Parameters
     ----------
     image : ndarray, optional
-        The image, drawn below them.
+        The image, drawn beneath the corners.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on; defaults to the current axes.
     ids : bool, optional

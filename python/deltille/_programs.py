@@ -3,7 +3,8 @@
 import signal
 import sys
 
-# Until the program installs its own handlers, Ctrl-C ends the process at once: no Python code runs to raise KeyboardInterrupt.
+# Until the program installs its own handlers, Ctrl-C ends the process immediately, because no Python code runs that could
+# raise KeyboardInterrupt.
 signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 from ._core import _run  # noqa: E402

@@ -79,8 +79,8 @@ def detect_many(
     Returns
     -------
     list of Detection or Failure
-        Results in the order of the images. An image that cannot be read gives a :class:`Failure`, which is false, has no
-        corners, and has the reason in ``error``. For a :class:`Detection`, ``error`` is ``None``.
+        Results in the order of the images. For an image that cannot be read, the result is a :class:`Failure`. It is falsy,
+        has no corners, and contains the reason in ``error``. For a :class:`Detection`, ``error`` is ``None``.
     """
     if isinstance(pictures, (str, bytes, os.PathLike)) or hasattr(pictures, "shape"):
         raise TypeError("pictures: expected a list, [picture]")
@@ -121,8 +121,8 @@ def load_detections(
     Parameters
     ----------
     path : path-like
-        A folder with ``.json`` files or Parquet tables of ``deltille detect`` or :mod:`deltille.ray`; or one of the two
-        tables, if the other is next to it.
+        A folder with ``.json`` files or Parquet tables from ``deltille detect`` or :mod:`deltille.ray`; or one of the two
+        tables, if the other is in the same folder.
     target : Target or sequence of Target, optional
         The target searched for, needed for :attr:`Detection.object_points`.
     assume_target : bool, optional
@@ -132,12 +132,12 @@ def load_detections(
     -------
     list of Detection or Failure
         Results in the order of the file names, or of the image names in tables. An image that could not be read during
-        detection gives a :class:`Failure`.
+        detection is represented by a :class:`Failure`.
 
     Raises
     ------
     FileError
-        If there are no such files, or if one is damaged.
+        If these files do not exist, or if one is damaged.
     """
     place = Path(path)
     texts = sorted(place.glob("*.json")) if place.is_dir() else []

@@ -1,6 +1,6 @@
 """Exceptions of this package.
 
-Every exception is an :class:`Error`. Most are also a :class:`ValueError`; those of files are an :class:`OSError`.
+Every exception is an :class:`Error`. Most are also a :class:`ValueError`; exceptions about files are an :class:`OSError`.
 """
 
 import errno as _errno
@@ -51,7 +51,7 @@ class DetectionError(Error, ValueError):
 
 
 class CalibrationError(Error, ValueError):
-    """A calibration that failed, or invalid arguments of one."""
+    """A calibration that failed, or invalid arguments of a calibration."""
 
 
 class CameraError(Error, ValueError):
@@ -79,11 +79,11 @@ class PermissionFileError(FileError, PermissionError):
 
 
 class FolderError(FileError, IsADirectoryError):
-    """A folder in place of a file; ``filename`` is its name."""
+    """A folder where a file is needed; ``filename`` is its name."""
 
 
 def _of_system(number: _Optional[int], filename: str) -> FileError:
-    """Returns the exception for an ``errno``; without one, for a folder in place of a file."""
+    """Returns the exception for an ``errno``; without one, the exception for a folder where a file is needed."""
     plain: _Any
     if number is None:
         plain = OSError(_errno.EISDIR, _os.strerror(_errno.EISDIR))

@@ -3,8 +3,8 @@
 :func:`detect` makes a dataset with a row for each corner or for each image. :func:`detect_to` writes both as Parquet tables
 into a folder or bucket, and skips images that already have results; ``deltille calibrate`` reads the folder.
 
-Only paths or encoded files are sent to the workers, and small tables come back. Decoded images stay in the process that
-handles them, which uses one thread. Ray handles lost processes and machines.
+Only paths or encoded files are sent to the workers, and the workers return small tables. Decoded images stay in the worker
+process, which uses one thread. Ray handles lost processes and machines.
 """
 
 from __future__ import annotations
@@ -107,7 +107,8 @@ class Summary:
     images, corners, errors : int
         Number of images processed, of corners found in them, and of images that could not be read.
     skipped : int
-        Number of images that already had results. Images of a dataset are not counted, as its length is not known.
+        Number of images that already had results. Images of a dataset are not counted, because the length of a dataset is
+        not known.
     """
 
     def __init__(self, images: int, corners: int, errors: int, skipped: int) -> None:
@@ -232,8 +233,8 @@ def detect_to(
     )
     if dataset is None:
         return Summary(0, 0, 0, skipped)
-    # One process writes all files, as starting one takes Ray a second. It reserves no processor: the detecting processes take
-    # them all, and would wait forever for the writer.
+    # A single process writes all files, because Ray needs a second to start a process. It reserves no processor: the
+    # detecting processes occupy all processors, so the writer would never start and they would wait for it forever.
     written = dataset.map_batches(
         _Writing,
         batch_size=images_per_file,
@@ -371,7 +372,7 @@ def _listed(paths: Paths, filesystem: Any) -> list[str]:
 
 
 class _Looking:
-    """A process that detects in images."""
+    """A worker process that detects targets in images."""
 
     def __init__(
         self,

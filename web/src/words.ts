@@ -165,14 +165,14 @@ export const words = {
       covered: (percent: number) => `${percent} % of the image area covered`,
       tilts: (least: number, most: number) => (least === most ? `tilt ${least}°` : `tilts from ${least}° to ${most}°`),
       coverage: "Corners detected so far; a stronger tint means more corners.",
-      leanings: "One dot per image: distance from the centre is the tilt of the board, direction is where the board is farther away.",
+      leanings: "One dot per image: the distance from the centre is the tilt of the board; the direction points to the side that is farther away.",
     },
     refuse: "Skip this pose",
     guided: (px: number, then: number | null) => `Projection uncertainty of distant points: ${px.toPrecision(2)} px${then === null ? "" : `, after this image ${then.toPrecision(2)} px`}.`,
     enough: "These images are enough: another one would hardly improve the calibration.",
     held: {
       unseen: "The target is not visible.",
-      elsewhere: "Move it to the outline.",
+      elsewhere: "Move it into the outline.",
       turned: "Tilt it to match the outline.",
       moving: "Hold it still.",
       blurred: "It is still, but out of focus.",
@@ -210,7 +210,7 @@ export const words = {
       linear: "Upper bound, linear programming",
       spheres: "Upper bound, sphere packing",
       why: (distance: number, correctable: number) =>
-        `Two codes differ in at least ${distance} cells in every rotation. Balls of ${correctable} cells around them therefore do not overlap, and the number of words limits how many fit. The linear-programming bound also uses the distribution of distances. Bars are logarithmic.`,
+        `Two codes differ in at least ${distance} cells in every rotation. Hamming balls of radius ${correctable} around them therefore do not overlap, and the total number of words limits their number. The linear-programming bound also uses the distribution of distances. The bars have a logarithmic scale.`,
     },
     reading: {
       heading: "Decoding under noise",
@@ -228,7 +228,7 @@ export const words = {
       cells: (count: number) => (count === 0 ? "none" : count === 1 ? "1" : `up to ${count}`),
       coins: "Random cells",
       natural: "Natural images",
-      why: (kind: string) => `Probability that a ${kind === "checker" ? "square" : "triangle"} with a border, but without a tag, is decoded as one. Random cells are black or white with equal probability. Natural cells are cut from photographs, where neighbours are correlated; their rate is known within a factor of 3.`,
+      why: (kind: string) => `Probability that a ${kind === "checker" ? "square" : "triangle"} with a border, but without a tag, is decoded as a tag. Random cells are black or white with equal probability. Natural cells are cut from photographs, where neighbours are correlated; their rate is known within a factor of 3.`,
       unknown: "The rate in natural images is not known for square tags.",
       recommended: (most: number | null, rate: number) =>
         most === null

@@ -12,9 +12,9 @@ use super::start::frames::{Frame, Start};
 use super::start::together::{self, Alone};
 use deltille_core::camera::PROJECTION_PARAMETERS;
 
-/// Largest standard deviation of focal lengths and principal point, as a fraction of the focal length. Beyond it the
-/// parameter counts as undetermined: standard deviations come from linearised equations, which are then wrong by as
-/// much as the standard deviation itself.
+/// Largest standard deviation of focal lengths and principal point, as a fraction of the focal
+/// length. Beyond it, the parameter counts as undetermined: standard deviations come from
+/// linearised equations, whose error is then as large as the standard deviation itself.
 const LOOSE_FOCAL: f64 = 0.1;
 
 impl Calibration {
@@ -70,7 +70,7 @@ impl Calibration {
         Ok(Estimate { excluded, findings, ..estimate })
     }
 
-    /// Rejects views of panels whose poses are not given.
+    /// Rejects views of panels whose poses are unknown.
     fn check_panels(&self) -> Result<(), CalibrationError> {
         let views = self.cameras.iter().flat_map(|camera| &camera.views);
         let mut seen = views.flat_map(|view| view.sightings.iter().map(move |of| (view, of.panel)));
@@ -140,7 +140,7 @@ impl Calibration {
 }
 
 /// # Errors
-/// Returns an error if no start is found, or the views do not determine the unknowns.
+/// Returns an error if no initial values are found, or the views do not determine the unknowns.
 fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
     match calibration.is_single() {
         true => alone::start(calibration),
@@ -157,8 +157,9 @@ fn by_itself(calibration: &Calibration) -> Result<Alone, CalibrationError> {
     Ok(Alone { camera, roughness, poses, excluded })
 }
 
-/// Rejects a camera whose focal length or principal point the views do not determine. Ill-conditioned parameters of the
-/// lens are accepted: within the image they describe the same camera.
+/// Rejects a camera if the views do not determine its focal length or principal point.
+/// Ill-conditioned parameters of the lens are accepted: within the image they describe the same
+/// camera.
 fn check_focal(found: &CameraEstimate) -> Result<(), CalibrationError> {
     let of_every_lens = &found.parameters[..PROJECTION_PARAMETERS.len()];
     let loose = of_every_lens.iter().filter(|p| {

@@ -22,7 +22,7 @@ impl fmt::Display for DegenerateMotion {
             }
             Self::OneAxis => {
                 "and the rig rotated about one axis only, so the position of the camera along that axis is \
-                 undetermined; rotate the rig, or the targets in front of it, about a second axis as well"
+                 undetermined; also rotate the rig, or the targets in front of it, about a second axis"
             }
         })
     }
@@ -68,7 +68,7 @@ pub enum CalibrationError {
         /// The problem with it.
         problem: String,
     },
-    /// Most detections are wrong.
+    /// More than half of the detections are wrong.
     #[error("{first} ({wrong} of {all} detections are wrong)")]
     MostWrong {
         /// The error of the first wrong detection.
@@ -86,7 +86,7 @@ pub enum CalibrationError {
         /// The failure.
         error: Box<CalibrationError>,
     },
-    /// Too few frames to hold any out.
+    /// Too few frames to hold out any.
     #[error(
         "cannot hold out one in {every} {}: there are only {all}",
         if *is_rig { "frames" } else { "views" }
@@ -109,7 +109,7 @@ pub enum CalibrationError {
         found: usize,
         /// Number of all views.
         all: usize,
-        /// Least number of usable views.
+        /// Minimum number of usable views.
         needed: usize,
     },
     /// The board was never tilted.
@@ -151,7 +151,7 @@ pub enum CalibrationError {
         cameras: String,
         /// Number of shared frames.
         shared: usize,
-        /// Least number of shared frames.
+        /// Minimum number of shared frames.
         needed: usize,
     },
     /// One of several targets, seen by no camera.
@@ -168,7 +168,7 @@ pub enum CalibrationError {
     TargetApart {
         /// Name of the target.
         target: String,
-        /// Least number of shared frames.
+        /// Minimum number of shared frames.
         needed: usize,
     },
     /// A camera that shares no target with the others, on a rig whose motion does not determine its pose.
@@ -204,7 +204,7 @@ pub enum CalibrationError {
         /// Number of panels.
         panels: usize,
     },
-    /// No focal length explains the views.
+    /// No focal length fits the views.
     #[error(
         "no camera fits the views: most corners are mislabelled, or the target is not the one that was \
          photographed"

@@ -28,7 +28,7 @@ pub struct Excluded {
 pub enum Reason {
     /// A detection that is not of the target; the text states the problem.
     Foreign(String),
-    /// A copy of the image of another view, which adds no information.
+    /// An image identical to that of another view, which adds no information.
     Copy {
         /// Name of the other view.
         of: String,
@@ -49,7 +49,7 @@ pub enum Reason {
         /// Median residual of its corners, px.
         off_px: f64,
     },
-    /// A frame that implies other cameras than the remaining frames do.
+    /// A frame that contradicts the cameras estimated from the remaining frames.
     Stranger {
         /// Whether the calibration has several cameras.
         is_rig: bool,
@@ -92,7 +92,7 @@ impl fmt::Display for Reason {
                  (its images were not taken at the same time, or a camera moved)"
             ),
             Self::Mirrored => f.write_str(
-                "the labels are mirrored: rows and columns are exchanged, or the image was flipped",
+                "the labels are mirrored: rows and columns are swapped, or the image was flipped",
             ),
             Self::OnlyWrongPanels => f.write_str(
                 "it shows only panels that are not where the target file places them",

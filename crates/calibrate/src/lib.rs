@@ -1,7 +1,8 @@
 //! Calibration of cameras and multi-camera rigs from detections of targets.
 //!
-//! Input: named detections, a target, and what is known of the cameras. Output: an [`Estimate`] with uncertainties, and
-//! a [`Diagnosis`] in words for each problem. The modules, in the order in which they process the data:
+//! Input: named detections, a target, and prior knowledge of the cameras. Output: an [`Estimate`]
+//! with uncertainties, and a [`Diagnosis`] in words for each problem. The modules, in the order in
+//! which they process the data:
 //!
 //! 1. `input` checks detections against the target and collects them with the settings in a [`Calibration`].
 //! 2. `problem` defines the unknowns, observations and residuals of a bundle adjustment, with their weights and priors.
@@ -12,10 +13,11 @@
 //! 7. `estimate` assembles the result from all of these.
 //! 8. `diagnose` reports the problems of an estimate, their causes and remedies.
 //!
-//! `adjusted` runs 4 to 7 on all views. `solve` wraps it and holds frames out; `automatic` selects a model with
-//! `solve`; `located` computes the pose of a target. `compare` and `next_view` read estimates. Every module may import
-//! `model` (lens models), `matrix` (in results), `error` (failures), `excluded` (excluded views and the reasons) and
-//! `cancel`; otherwise a module imports only from modules above it in this list.
+//! `adjusted` runs 4 to 7 on all views. `solve` wraps it and holds out frames; `automatic` selects
+//! a model with `solve`; `located` computes the pose of a target. `compare` and `next_view` read
+//! estimates. Every module may import `model` (lens models), `matrix` (in results), `error`
+//! (failures), `excluded` (excluded views and the reasons) and `cancel`; otherwise a module imports
+//! only from modules above it in this list.
 //!
 //! A pixel is predicted through a chain of frames,
 //!
@@ -24,8 +26,9 @@
 //! ```
 //!
 //! and each link may be unknown. One camera with one target is a rig of one camera, which defines the rig frame, with
-//! the panels fixed where the target file places them. That fixes the *gauge*: camera 0 is the rig frame, the target
-//! frame is that of its file, and the frame of the first target is the scene frame. Every pose is relative to these.
+//! the panels fixed where the target file places them. That fixes the *gauge*: camera 0 defines the
+//! rig frame, the target frame is that of its file, and the frame of the first target is the scene
+//! frame. Every pose is relative to these.
 //!
 //! A small change of a pose is (ω, τ): exp(ω) multiplies the rotation from the left, in the frame that the pose maps
 //! to, and τ is added to the translation. Standard deviations of poses are those of ω (rad) and τ (mm).

@@ -23,10 +23,10 @@ const SPLINE_KNOTS: [usize; 2] = [16, 12];
 /// Default degree of a spline.
 const SPLINE_DEGREE: usize = 3;
 
-/// Starting values of ξ in the two valleys of the double sphere model.
+/// Starting values of ξ in the two cost valleys of the double sphere model.
 const VALLEYS: [f64; 2] = [-0.3, 0.3];
 
-/// A camera model: which parameters are estimated beside fx, fy, cx and cy.
+/// A camera model: which parameters are estimated in addition to fx, fy, cx and cy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Model {
@@ -70,7 +70,8 @@ struct Facts {
     model: Model,
     /// Its lens.
     lens: LensKind,
-    /// Maximum number of lens parameters that are estimated, from the first; the others are zero.
+    /// Maximum number of lens parameters that are estimated, counted from the first; the others are
+    /// zero.
     found: usize,
     /// Its description in help texts.
     help: &'static str,
@@ -190,7 +191,7 @@ pub(super) const TRIED: [Model; 10] = [
     Model::SPLINE,
 ];
 
-/// The models with a description each, as a list in a sentence.
+/// The models, each with a description, as a list in a sentence.
 fn listed(said: impl Fn(&Facts) -> &'static str) -> String {
     let model = |facts: &Facts| match said(facts) {
         "" => facts.name.to_owned(),
@@ -223,7 +224,8 @@ impl Model {
         self.facts().lens
     }
 
-    /// Returns the number of estimated lens parameters, from the first; the others are zero.
+    /// Returns the number of estimated lens parameters, counted from the first; the others are
+    /// zero.
     pub fn parameter_count(self) -> usize {
         self.lens().names().len().min(self.facts().found)
     }
@@ -280,7 +282,7 @@ impl Model {
         }
     }
 
-    /// Returns models that may describe a lens that this model does not, the simplest first.
+    /// Returns models that may fit a lens that this model does not fit, the simplest first.
     pub fn richer(self) -> &'static [Self] {
         match self {
             Self::KannalaBrandt(terms) if terms >= MORE_TERMS => &[Self::Pupil],
@@ -367,8 +369,9 @@ fn spline(text: &str) -> Option<(usize, Option<[usize; 2]>)> {
 
 /// Removes gauge parameters from the free parameters of a camera.
 ///
-/// For a spline, these are fx, fy, cx, cy. Any rotation of the camera is also a spline, so three numbers are fixed in addition:
-/// both coordinates of the knot in the middle, and one of the knot to its right.
+/// For a spline, these are fx, fy, cx, cy. A spline can also represent any rotation of the camera,
+/// so three more numbers are fixed: both coordinates of the knot in the middle, and one of the knot
+/// to its right.
 pub(super) fn without_gauge(lens: &Lens, mut free: Vec<bool>) -> Vec<bool> {
     let Lens::Spline(spline) = lens else { return free };
     if !free.contains(&true) {

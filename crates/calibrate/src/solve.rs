@@ -1,4 +1,4 @@
-//! Solves a calibration: holds frames out, and names given cameras that contradict their images.
+//! Solves a calibration: holds out frames, and reports given cameras that contradict their images.
 
 use super::error::CalibrationError;
 use super::estimate::values::Estimate;

@@ -112,7 +112,7 @@ pub fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
 /// Treatment of existing files. Files of the same kind are always replaced.
 #[derive(clap::Args, Clone, Copy, Default)]
 pub struct Overwrite {
-    /// Overwrite existing files of any type, whichever program wrote them
+    /// Overwrite existing files, including those that other programs wrote
     #[arg(long)]
     force: bool,
 }

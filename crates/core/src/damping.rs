@@ -4,7 +4,7 @@
 const EASE: f64 = 0.1;
 const STIFFEN: f64 = 10.0;
 
-/// Damping of steps, as a fraction of the diagonal that is added to it.
+/// Damping of steps: the fraction of the diagonal that is added to the diagonal.
 #[derive(Clone, Copy, Debug)]
 pub struct Damping {
     part: f64,

@@ -14,7 +14,7 @@ use crate::{Name, quantity};
 pub struct Fingerprint(u64);
 
 impl Fingerprint {
-    /// The first eight digits, as printed on sheets.
+    /// Returns the first eight digits, as printed on sheets.
     pub fn short(self) -> String {
         format!("{:08x}", self.0 >> 32)
     }
@@ -126,7 +126,7 @@ pub fn check_same_board(
     let mut pairs = of_first.iter().flat_map(|one| of_second.iter().map(move |other| (one, other)));
     match pairs.find(|(one, other)| one.is_confusable(other)) {
         Some((one, other)) => Err(format!(
-            "{first} was made with {one}, {second} with {other}: rows, columns and tags match, but the corner positions differ, so at least one description is not that of the photographed board"
+            "{first} was made with {one}, {second} with {other}: rows, columns and tags match, but the corner positions differ, so at least one description does not match the photographed board"
         )),
         None => Ok(()),
     }

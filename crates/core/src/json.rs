@@ -18,7 +18,7 @@ pub fn to_text<T: Serialize>(value: &T, depth: usize) -> String {
     String::from_utf8(text).expect("JSON is UTF-8")
 }
 
-/// Why a JSON text could not be read.
+/// Why a JSON string could not be read.
 pub enum ReadError {
     /// Not JSON, or not an object of this kind at all.
     Json(serde_json::Error),
@@ -51,7 +51,8 @@ pub fn read<T: serde::de::DeserializeOwned>(json: &str) -> Result<T, ReadError> 
     Ok(value)
 }
 
-/// Reads the schema that a JSON text names, for example `deltille/target/1`, shortened if it is very long. Returns
+/// Reads the schema that a JSON string names, for example `deltille/target/1`, shortened if it is
+/// very long. Returns
 /// `None` if it names none.
 ///
 /// # Errors
@@ -65,7 +66,8 @@ pub fn schema(text: &[u8]) -> serde_json::Result<Option<String>> {
     serde_json::from_slice::<Head>(text).map(|head| head.schema.map(|schema| cut(&schema).into()))
 }
 
-/// Reads the schema that a JSON text must name. Callers read it first, so that a file of another kind or version is
+/// Reads the schema that a JSON string must name. Callers read it first, so that a file of another
+/// kind or version is
 /// reported as one.
 ///
 /// # Errors

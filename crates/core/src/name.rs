@@ -16,7 +16,7 @@ const LONGEST: usize = 64;
 pub struct Name(String);
 
 impl Name {
-    /// Creates a name from a text.
+    /// Creates a name from a string.
     ///
     /// # Errors
     /// Returns an error that describes what makes the text invalid.
@@ -46,7 +46,7 @@ impl Name {
         Self::new(name)
     }
 
-    /// Makes a valid name from any text; `-` replaces invalid characters.
+    /// Makes a valid name from any string; `-` replaces invalid characters.
     pub fn like(text: &str) -> Self {
         let plain = text.trim_start_matches(['.', '-', '/', '\\']).chars().take(LONGEST);
         let name: String = plain.map(|c| if is_plain(c) { c } else { '-' }).collect();

@@ -30,7 +30,7 @@ macro_rules! settings {
     };
 }
 
-// Each is called by the words of its path, without `Spec`.
+// Each is named after the words of its path, without `Spec`.
 settings! {
     AprilGridGap = "AprilGridSpec::gap",
     AprilGridTagMm = "AprilGridSpec::tag_mm",
@@ -130,9 +130,9 @@ fn in_backquotes(setting: Setting) -> String {
 
 /// Sets how settings are named in all later messages. The default is the library path between backquotes.
 ///
-/// The choice is global to the process, like a panic hook, because a process has one front end. Messages are made
-/// deep in the library, on any thread, and stored as text in results and files, without a record of the front end
-/// they are for.
+/// The choice is global to the process, like a panic hook, because a process has one front end. The
+/// library creates messages on any thread and stores them as text in results and files. They do not
+/// record the front end that they are for.
 pub fn speak(words: fn(Setting) -> String) {
     *WORDS.write().unwrap_or_else(PoisonError::into_inner) = words;
 }

@@ -12,7 +12,7 @@ pub fn median(mut values: Vec<f64>) -> Option<f64> {
 }
 
 /// Returns the quantile of `values` at `part`, from 0 to 1: the smallest value with at least that fraction of the
-/// values below it, or the largest value. Returns `None` for no values. Sorts the values.
+/// values below it, or the largest value. Returns `None` if there are no values. Sorts the values.
 pub fn quantile(values: &mut [f64], part: f64) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let last = values.len().checked_sub(1)?;

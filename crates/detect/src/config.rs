@@ -17,8 +17,9 @@ pub struct DetectorConfig {
     /// Maximum number of corrected bits in a tag. `None` means ⌊(h − 1)/2⌋, where h is the Hamming distance of its
     /// family.
     pub max_bit_errors: Option<u32>,
-    /// Whether mirrored grids are labelled too. They get the labels of the print, but no direct view of the print has
-    /// such a grid. Use them only to find out what mirrored the image.
+    /// Whether mirrored grids are labelled too. They get the labels of the print, but no direct
+    /// view of the print shows a mirrored grid. Use these labels only to diagnose why an image is
+    /// mirrored.
     pub allow_mirrored: bool,
     /// Method that refines the positions of the corners.
     pub refinement: Refinement,

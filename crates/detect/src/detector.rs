@@ -58,9 +58,10 @@ impl Detector {
     /// `size` is the number of rows and columns of corners of an untagged board. If it is given, a grid that shows the
     /// whole board is labelled from its lower left corner. All other grids get relative labels.
     ///
-    /// On a checkerboard, (0, 0) is the corner whose upper right square is dark while that corner is the lower left
-    /// one. If rows + columns is even, the board looks the same after a rotation by 180°. The candidate that lies lower
-    /// in the image then becomes (0, 0).
+    /// On a checkerboard, the board is oriented so that the square to the upper right of its lower
+    /// left corner is dark. That corner is (0, 0). If rows + columns is even, the board looks the
+    /// same after a rotation by 180°. Of the two candidates, the one that is lower in the image
+    /// then becomes (0, 0).
     pub fn for_grid(kind: GridKind, size: Option<(u32, u32)>, config: DetectorConfig) -> Self {
         let labels = Labels::of_size(kind, size, &config);
         let main = OneTiling::new(kind, labels, TagAreas::default(), None, config);
@@ -69,8 +70,8 @@ impl Detector {
 
     /// Creates a detector for a target.
     ///
-    /// An untagged panel is labelled if it is seen whole and no other panel of the target has the same outline.
-    /// [`Self::for_grid`] defines the first corner of an untagged checkerboard.
+    /// An untagged panel is labelled if all of it is visible and no other panel of the target has
+    /// the same outline. [`Self::for_grid`] defines the first corner of an untagged checkerboard.
     ///
     /// # Errors
     /// Returns an error if the family of the tags is unknown; see [`Target::set_family`].
@@ -89,7 +90,7 @@ impl Detector {
         Ok(Self { main, other, targets: vec![target.identity()] })
     }
 
-    /// Creates a detector for several targets, which it detects in one pass over an image.
+    /// Creates a detector that detects several targets in one pass over an image.
     /// [`Grid::target`](crate::Grid::target) names the target of each grid.
     ///
     /// # Errors
@@ -154,11 +155,12 @@ impl Detector {
         Self { main: self.main.with_clock(clock), other, ..self }
     }
 
-    /// Returns this detector for a print whose ink spread is already estimated.
+    /// Returns this detector with an ink spread that was already estimated for the print.
     pub fn with_ink(self, ink: InkEstimate) -> Self {
         let edge_mm = self.main.edge_mm;
         let of_other = |other: Box<OneTiling>| match (edge_mm, other.edge_mm) {
-            // The same ink spread in mm, as a fraction of edges of another length.
+            // Converts the ink spread, which is the same in mm, to a fraction of the other edge
+            // length.
             (Some(edge_mm), Some(other_mm)) => {
                 let mut ink = ink;
                 for edges in [&mut ink.edges, &mut ink.edges_sd] {
@@ -177,8 +179,8 @@ impl Detector {
         self.main.ink
     }
 
-    /// Combines the ink estimates of several images of one print. Returns `None` if the ink was given, or if a second
-    /// pass with the combined estimate would change nothing.
+    /// Combines the ink estimates of several images of one print. Returns `None` if the ink spread
+    /// was given, or if a second pass with the combined estimate would change nothing.
     pub fn ink_of_all(&self, found: &[Option<InkEstimate>]) -> Option<InkEstimate> {
         let known: Vec<InkEstimate> = found.iter().copied().flatten().collect();
         let is_worth = self.main.is_ink_asked() && found.len() > 1;
@@ -198,7 +200,7 @@ impl Detector {
         self.detect_view(image.into(), name)
     }
 
-    /// Implements [`Self::detect`], compiled here instead of in every crate that uses it.
+    /// Implements [`Self::detect`] without generics, so that it is compiled only in this crate.
     fn detect_view(&self, image: ImageView, name: &str) -> Detection {
         let mut timing = self.main.timing();
         let pyramid = Pyramid::new(image, levels_of(image), MIN_LEVEL_SIDE);
@@ -226,13 +228,14 @@ fn kind_of(target: &Target) -> GridKind {
     target.panels.first().map_or(GridKind::Deltille, |panel| panel.kind)
 }
 
-/// Returns the edge length of the tiles, mm, if all tiles have the same.
+/// Returns the edge length of the tiles, mm, if it is the same for all tiles.
 fn edge_of(targets: &[&Target]) -> Option<f64> {
     let edges = || targets.iter().flat_map(|target| &target.panels).map(|panel| panel.edge_mm);
     edges().next().filter(|first| edges().all(|edge| edge == *first))
 }
 
-/// Combines the detections of both tilings in one image. A grid of one tiling is not a reason for failure in the other.
+/// Combines the detections of both tilings in one image. If one tiling has a labelled grid, the
+/// failure of the other tiling is not reported.
 fn both(deltille: Detection, checker: Detection) -> Detection {
     let is_there = |found: &Detection| found.grids.iter().any(|grid| grid.panel.is_some());
     let [main, other] = match is_there(&checker) && !is_there(&deltille) {

@@ -1,11 +1,13 @@
 //! SIMD lanes.
 
-/// Number of single-precision lanes of the widest processors.
+/// Number of single-precision lanes of the widest vector registers.
 pub(crate) const LANES: usize = 16;
 
-/// Returns the sum of the lanes. Adds by halves, because sixteen additions in sequence would wait for each other.
+/// Returns the sum of the lanes. Adds pairwise, because each of sixteen sequential additions would
+/// wait for the previous one.
 ///
-/// Not inlined: within the loop that computes the lanes, the compiler would keep sixteen numbers instead of one vector.
+/// Not inlined: within the loop that computes the lanes, the compiler would keep sixteen scalars
+/// instead of one vector.
 #[inline(never)]
 pub(crate) fn sum(lanes: &[f32; LANES]) -> f32 {
     let (mut eight, mut four) = ([0.0; LANES / 2], [0.0; LANES / 4]);

@@ -2,11 +2,13 @@
 
 use deltille_core::raster::ImageView;
 
-/// Minimum number of levels for every image. The coarsest level shows four times the blur that the finest can.
+/// Minimum number of levels for every image. The coarsest level shows corners with four times as
+/// much blur as the finest level can.
 pub(super) const PYRAMID_LEVELS: usize = 3;
 
-/// Minimum side of the further levels of larger images, px. An enlarged or blurred image shows as much as a small one,
-/// in which a dozen corners in a line are 10 px apart.
+/// Minimum side of the additional levels of larger images, px. An enlarged or blurred image shows
+/// no more detail than a small one. At this size, a dozen corners in a row can still be 10 px
+/// apart.
 const MIN_FURTHER_SIDE: usize = 150;
 
 /// Minimum side of a level that can show a grid, px.

@@ -1,12 +1,12 @@
 //! Detection: from an image to labelled corners.
 //!
-//! Input: an image and the targets to detect. Output: a [`Detection`]. The modules run in this order. Each follows
-//! section 3 of the paper, extended by measured improvements:
+//! Input: an image and the targets to detect. Output: a [`Detection`]. The modules run in this
+//! order. Each follows section 3 of the paper, with extensions that were verified by measurement:
 //!
-//! 1. `levels` chooses the levels of the image pyramid.
+//! 1. `levels` chooses the number of pyramid levels.
 //! 2. `corners` finds single corners and the edges that meet there.
 //! 3. `grid` joins corners into grids: lattice coordinates without an origin.
-//! 4. `labels` reads tags and decides where on the target a grid lies.
+//! 4. `labels` reads tags and locates each grid on the target.
 //! 5. `refine` fits the final positions and their covariances to the raw pixels.
 //!
 //! [`deltille_core::detection`] defines the result.

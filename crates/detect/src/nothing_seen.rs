@@ -1,4 +1,5 @@
-//! Finds the reason why an image shows no grid of a tiling: a grid of the other tiling, too small a grid, or neither.
+//! Finds the reason why no grid of a tiling was detected: the image shows the other tiling, the
+//! grid is too small, or neither.
 
 use super::labels::why;
 use super::levels::{MIN_LEVEL_SIDE, PYRAMID_LEVELS};
@@ -9,7 +10,7 @@ use deltille_core::detection::{MIN_UNTAGGED_EDGE_PX, Reason, ReasonKind};
 use deltille_core::lattice::GridKind;
 use deltille_core::raster::{Gray, PYRAMID_FULL_SCALE, Pyramid};
 
-/// Fewest corners of a grid of the other tiling that is reported as a mistaken tiling.
+/// Minimum number of corners of a grid of the other tiling for which a wrong tiling is reported.
 const MIN_OTHER_CORNERS: usize = 20;
 
 /// Returns the reason why an image with this number of corners has no grid.
@@ -36,8 +37,8 @@ pub(super) fn nothing_found<const N: usize>(pyramid: &Pyramid, corners: usize) -
     reason
 }
 
-/// Returns the edge length in px of a grid that is too small to detect. Enlarges the part of the image with the most
-/// contrast to twice its size to find it.
+/// Returns the edge length in px of a grid that is too small to detect. To find it, doubles the
+/// size of the image part with the highest contrast.
 fn edge_of_small_tiles<const N: usize>(level: &Gray<i16>) -> Option<f64> {
     /// Width and height of the part, px. Enlarged, it has half a megapixel. Twenty corners 7 px apart fill 1 % of it.
     const PART: [usize; 2] = [400, 300];
@@ -58,7 +59,8 @@ fn edge_of_small_tiles<const N: usize>(level: &Gray<i16>) -> Option<f64> {
     (largest.len() >= MIN_OTHER_CORNERS && edge_px < MIN_UNTAGGED_EDGE_PX).then_some(edge_px)
 }
 
-/// Returns the first pixel of a part of the given columns and rows, around the square with the most contrast.
+/// Returns the top left pixel of an image part of the given width and height, centred on the square
+/// with the highest contrast if the image permits.
 fn busiest_part(level: &Gray<i16>, size: [usize; 2]) -> [usize; 2] {
     /// Side of the square, px. Twenty corners of tiles that are too small fit into it.
     const SQUARE: usize = 64;

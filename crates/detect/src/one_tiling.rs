@@ -27,9 +27,9 @@ use deltille_core::lattice::GridKind;
 use deltille_core::raster::{ImageView, Pyramid};
 use deltille_core::targets::least_untagged_corners;
 
-/// Largest blur of an untagged grid, as a fraction of the edge length. At this blur, the next wave has less than a
-/// tenth of the amplitude of the fundamental wave. From the fundamental wave alone the model reads a blur of 0.25 of the
-/// edge, from three waves 0.155.
+/// Largest blur of an untagged grid, as a fraction of the edge length. At this blur, the next
+/// harmonic has less than a tenth of the amplitude of the fundamental. The model estimates a blur
+/// of 0.25 edges from the fundamental alone, and of 0.155 edges from three harmonics.
 const fn max_untagged_blur(kind: GridKind) -> f64 {
     match kind {
         GridKind::Deltille => 0.14,
@@ -37,25 +37,25 @@ const fn max_untagged_blur(kind: GridKind) -> f64 {
     }
 }
 
-/// Maximum number of reported reasons for missing labels. The largest grids are reported.
+/// Maximum number of reported reasons for missing labels, those of the largest grids.
 const MAX_REASONS: usize = 3;
 
-/// Fewest pixels per corner of a level on which the whole board is searched. If the board covers a third of the image,
-/// its edges are 18 px long there.
+/// Minimum number of pixels per corner on a level that is searched for the whole board. If the
+/// board covers a third of the image, its edges are 18 px long there.
 const MIN_PX2_A_CORNER: usize = 1000;
 
-/// Minimum edge length on a coarser level, px. The corner fit reads pixels up to this distance, and pixels of the next
-/// corners displace it.
+/// Minimum edge length on a coarser level, px. The corner fit uses pixels up to this distance.
+/// Pixels near neighbouring corners bias it.
 const MIN_COARSE_EDGE_PX: f64 = 7.0;
 
-/// Radius of the polynomial refinement, px: that of the reference detector.
+/// Radius of the polynomial refinement, px, as in the reference detector.
 const POLYNOMIAL_RADIUS: usize = 3;
 
 /// Micrometres per millimetre.
 const UM_IN_MM: f64 = 1e3;
 
-/// Largest radius of the model refinement, px. Beyond it, lens distortion bends edges by more than a wider window
-/// gains.
+/// Largest radius of the model refinement, px. Beyond it, the curvature of edges by lens distortion
+/// costs more accuracy than a wider window gains.
 const MODEL_RADIUS: usize = 10;
 
 /// An image and its pyramid.
@@ -100,7 +100,7 @@ impl Finder {
 pub(super) struct OneTiling {
     finder: Finder,
     refiner: Refiner,
-    /// Areas where tiles show something other than their colour.
+    /// Areas of the tiles that a tag covers.
     tag_areas: TagAreas,
     labels: Labels,
     /// Edge length of the tiles, mm, if all panels have the same.
@@ -199,9 +199,10 @@ impl OneTiling {
         found
     }
 
-    /// Searches for a single board on the coarser levels of the pyramid. Returns it if a level shows the whole board
-    /// and nothing similar. Finer levels would add only the positions of corners, which are refined anyway. If
-    /// refinement loses a corner, the finer levels are searched too.
+    /// Searches for a single board on the coarser levels of the pyramid. Returns it if a level
+    /// shows the whole board and nothing else that resembles a board. Finer levels would add only
+    /// the positions of corners, which are refined anyway. If refinement loses a corner, the finer
+    /// levels are searched too.
     fn whole_on_coarser_level<const N: usize>(
         &self,
         finder: &SaddleFinder<N>,
@@ -277,7 +278,8 @@ impl OneTiling {
         Found { grids, optics, left_out, saddles: saddles.len() }
     }
 
-    /// Refines the corners of the grids. Returns those that still are grids, and the optics that they have in common.
+    /// Refines the corners of the grids. Returns those that are still grids, and the optics that
+    /// they have in common.
     fn refined<const N: usize>(&self, frame: Frame, grids: Judged) -> (Judged, Optics) {
         let least = least_untagged_corners(kind::<N>()) as usize;
         let mut fitter = CornerFitter::default();
@@ -351,8 +353,8 @@ impl OneTiling {
         grids
     }
 
-    /// Refines all grids on the level of the pyramid that suits their blur. Returns the common optics, and for each
-    /// grid whether the blur leaves only a wave of it.
+    /// Refines all grids on the level of the pyramid that suits their blur. Returns the common
+    /// optics, and for each grid whether blur leaves only its fundamental wave.
     fn refine(
         &self,
         fitter: &mut CornerFitter,
@@ -368,7 +370,7 @@ impl OneTiling {
             grids.iter_mut().for_each(|grid| grid.moved_to_level(number));
             let blurs = self.refiner.blurs(fitter, level, grids, &self.tag_areas);
             let optics = self.refiner.optics(fitter, level, grids, &blurs, &self.tag_areas);
-            // Motion blur leaves an image sharp across the direction of motion.
+            // Motion blur leaves an image sharp perpendicular to the motion.
             let found = is_sampled(&blurs, optics.narrowest())
                 .then(|| self.refine_under(fitter, image, grids, &optics, &blurs));
             grids.iter_mut().for_each(|grid| grid.moved_from_level(number));
@@ -381,7 +383,7 @@ impl OneTiling {
         (optics, are_waves)
     }
 
-    /// Refines the grids in an image that shows them under these optics and blurs, px; see [`Self::refine`].
+    /// Refines the grids in an image with these optics and blurs, px; see [`Self::refine`].
     fn refine_under(
         &self,
         fitter: &mut CornerFitter,

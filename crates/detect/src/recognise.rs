@@ -1,9 +1,10 @@
 //! Recognises the target in an image by its tags alone.
 //!
-//! Tiles of a grid are read as tags of every known family. A family whose codes are significant gives the rotation of
-//! the grid. The ids of its tags increase by row and column, so they give the number of tags per row and the width of
-//! the board. The result is a guess. It is accepted if the detector labels the image with it: the evidence of the whole
-//! board decides, as for a given target.
+//! Tiles of a grid are read as tags of every known family. If the codes of a family are
+//! statistically significant, they determine the rotation of the grid. The ids of its tags increase
+//! by row and column, so they give the number of tags per row and the width of the board. The
+//! result is a guess. It is accepted if the detector labels the image with it: the evidence of the
+//! whole board decides, as for a given target.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -26,27 +27,29 @@ use deltille_core::targets::{
 /// Maximum number of grids that are read, the largest first.
 const MAX_GRIDS: usize = 4;
 
-/// Fewest corners of a grid that is read: those of a tile and its neighbours, which a tag needs.
+/// Minimum number of corners of a grid that is read. A tag needs the corners of its tile and of the
+/// neighbouring tiles.
 const MIN_CORNERS: usize = 12;
 
 /// Maximum number of tiles that are read in a grid.
 const MAX_TILES: usize = 600;
 
-/// Evidence from which tags are significant, nats: noise exceeds it once in a million, for each way to read them.
+/// Minimum evidence of significant tags, nats. For each way to read the tags, noise exceeds it once
+/// in a million.
 const MIN_EVIDENCE: f64 = 18.0;
 
-/// Cost of a corner seen beyond a board, relative to a corner of the board that is not seen. Covers hide corners, but
-/// hardly anything imitates them. With 3, an outer row is accepted from a quarter of its corners on; with 1 it would be
-/// half.
+/// Cost of a corner seen beyond a board, relative to a corner of the board that is not seen.
+/// Occluders hide corners, but hardly anything looks like a corner. With 3, an outer row is
+/// accepted if a quarter of its corners are visible; with 1, it would need half of them.
 const COST_BEYOND: usize = 3;
 
 /// Maximum number of rows and columns of a board beyond the visible ones.
 const MAX_BEYOND: u32 = 12;
 
-/// Widest spacing of tags that is tried.
+/// Largest tag spacing that is tried.
 const WIDEST_SPACING: i32 = 8;
 
-/// One tag in so many may contradict a board that is tried.
+/// One in this many tags may contradict a candidate board.
 const ODD_TAGS: usize = 12;
 
 /// A recognised target.
@@ -57,8 +60,9 @@ pub struct Recognised {
     pub target: Target,
     /// Number of tags that were read.
     pub tags: usize,
-    /// Number of corners of the target, and number of them visible in the image. The board may extend beyond the image:
-    /// if the second number is smaller, it may be larger still.
+    /// Number of corners of the target, and number of them visible in the image. The board may
+    /// extend beyond the image. If the second number is smaller, the actual board may be larger
+    /// than this target.
     pub corners: [usize; 2],
 }
 
@@ -221,13 +225,13 @@ impl<'a> Way<'a> {
     }
 }
 
-/// Returns the lattice rotations that set a tag upright.
+/// Returns the number of lattice rotations that make a tag upright.
 fn turns_of(kind: GridKind, seen: &Seen) -> u8 {
     panel_from_grid(seen.tile, kind.tag_tile(Vertex::new(0, 0)), seen.rotations).rotations()
 }
 
-/// Returns the tags of a family that have the same orientation, as on a board, and the evidence for them. Returns
-/// `None` if they are not significant.
+/// Returns the tags of a family that have a common orientation, as they have on a board, and the
+/// evidence for them. Returns `None` if they are not significant.
 fn same_orientation(
     read: &Read,
     Known { family, decoder }: &Known,
@@ -245,7 +249,7 @@ fn same_orientation(
         let seen = Seen { tile: reading.tile, id: decoded.id, rotations: decoded.rotations };
         let (tags, evidence) = by_turns.entry(turns_of(family.kind(), &seen)).or_default();
         tags.push(seen);
-        // Some of all tiles may look like tags by coincidence.
+        // Some tiles may look like tags by coincidence.
         *evidence -= (chance * read.readings.len() as f64).min(1.0).ln();
     }
     let best = by_turns.into_values().max_by(|a, b| a.1.total_cmp(&b.1));
@@ -259,7 +263,8 @@ impl Sighting<'_> {
         TagSpec { family, first_id, spacing, border_bits, tags_in, hole_mm: None }
     }
 
-    /// Returns the smallest board with these tags in these positions, and these corners.
+    /// Returns the smallest board that has these tags at these positions and contains these
+    /// corners.
     fn board(&self) -> Option<BoardSpec> {
         let range = |of: fn(&Vertex) -> i32| {
             let least = self.corners.iter().map(of).min()?;
@@ -323,8 +328,8 @@ impl Sighting<'_> {
         (1..=WIDEST_SPACING).filter(move |spacing| common % spacing == 0).rev()
     }
 
-    /// Returns the first id that explains the tags on a board of these corners, and the shift from the grid to the
-    /// board.
+    /// Returns the first id with which a board of these corners explains the tags, and the shift
+    /// from the grid to the board.
     fn laid_on(&self, vertices: &[Vertex], spacing: i32) -> Option<(u32, Vertex)> {
         let places = tagged_tiles(self.kind, vertices, spacing as u32, self.tags_in);
         let index: BTreeMap<Vertex, u32> = places.iter().copied().zip(0..).collect();
@@ -368,7 +373,7 @@ mod tests {
     use deltille_core::raster::Gray;
     use deltille_layout::synth::{Light, scene_of_target};
 
-    /// Renders an image of a target from an eye that looks at a point, mm.
+    /// Renders an image of a target from a camera at `eye` that points at `at`, mm.
     fn picture(target: &Target, eye: [f64; 3], at: [f64; 3]) -> Gray<f32> {
         let scene = scene_of_target(target).unwrap();
         let pose = Pose::looking_at(DVec3::from(eye), DVec3::from(at), DVec3::Y);

@@ -16,8 +16,9 @@ impl Printing {
     /// outline of its plate instead.
     ///
     /// # Errors
-    /// Returns an error if a spot colour name is invalid, if the finish is not plain and a board spans several pages or
-    /// the print has a guide page, or if a two-sided board is to be mirrored.
+    /// Returns an error if a spot colour name is invalid, or if a two-sided board is to be
+    /// mirrored. A finish that is not plain is also an error if a board spans several pages or the
+    /// print has a guide page.
     ///
     /// ```
     /// use deltille_layout::{Finish, Printing};
@@ -35,7 +36,7 @@ impl Printing {
             return Err(TargetError::invalid(PaperPoster, problem));
         }
         if !finish.is_plain() && self.sheets.iter().any(|sheet| sheet.placements.is_empty()) {
-            let problem = "the guide page cannot be mirrored or printed in spot colours: make it with a plain print";
+            let problem = "the guide page cannot be mirrored or printed in spot colours: add it to a print without these settings";
             return Err(TargetError::invalid(PaperGuidePage, problem));
         }
         if finish.mirrored && self.target.spec.two_sided_mm().is_some() {

@@ -21,7 +21,7 @@ const SIZES: [(&str, [f64; 2]); 9] = [
     ("tabloid", [279.4, 431.8]),
 ];
 
-/// Longest side of a sheet, mm: PDF page boxes end at 14,400 pt (ISO 32000-1, annex C).
+/// Longest side of a sheet, mm: PDF page boxes are limited to 14,400 pt (ISO 32000-1, annex C).
 const LONGEST_MM: f64 = 5080.0;
 
 /// Shortest side of a sheet, mm: smaller paper has no room for check bars.
@@ -140,7 +140,7 @@ pub struct PaperSize {
     long_mm: f64,
 }
 
-/// Error for a text that is not a paper size or an orientation.
+/// Error for a string that is not a paper size or an orientation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PaperError {
@@ -181,12 +181,12 @@ impl PaperSize {
         &self.name
     }
 
-    /// Returns width and height in portrait orientation, mm.
+    /// Returns the width and height in portrait orientation, mm.
     pub fn portrait_mm(&self) -> DVec2 {
         DVec2::new(self.short_mm, self.long_mm)
     }
 
-    /// Returns width and height in landscape orientation, mm.
+    /// Returns the width and height in landscape orientation, mm.
     pub fn landscape_mm(&self) -> DVec2 {
         DVec2::new(self.long_mm, self.short_mm)
     }
@@ -201,7 +201,8 @@ impl fmt::Display for PaperSize {
 impl FromStr for PaperSize {
     type Err = PaperError;
 
-    /// Parses a name in any case, or two lengths such as `297x420mm`, `11 × 17 in` or `30cmx40cm`.
+    /// Parses a name, ignoring case, or two lengths such as `297x420mm`, `11 × 17 in` or
+    /// `30cmx40cm`.
     fn from_str(text: &str) -> Result<Self, PaperError> {
         let unknown = || PaperError::Unknown(text.to_owned());
         let trimmed = text.trim();

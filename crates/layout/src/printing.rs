@@ -42,7 +42,8 @@ impl Printing {
     /// Builds the target described by `spec` with a shipped family, on the smallest paper that fits it.
     ///
     /// # Errors
-    /// Returns an error if the name is not a file name, a number is out of range, the family is not shipped or has too
+    /// Returns an error if the name is not a valid file name, a number is out of range, the family
+    /// is not shipped or has too
     /// few codes, or the target does not fit on A0.
     ///
     /// ```
@@ -118,7 +119,8 @@ impl Printing {
         Ok(printing)
     }
 
-    /// Returns the printing under the name that is on the sheets. For a measured or refined target, that is the name of
+    /// Returns the printing with the name that is printed on the sheets. For a measured or refined
+    /// target, that is the name of
     /// its plan.
     pub fn under_printed_name(&self) -> Cow<'_, Self> {
         let Some(plan) = &self.target.plan else { return Cow::Borrowed(self) };

@@ -126,8 +126,9 @@ pub enum LineKind {
     Valley,
     /// Line between two coplanar faces, not to be folded; dotted.
     Flat,
-    /// Alignment mark; drawn solid. It is a stroke of a registration cross, on which shared pages or single faces are
-    /// aligned, a mark at the corner of a plate, or a line of the page overview or another figure.
+    /// Alignment mark; drawn solid. It is a stroke of a registration cross for aligning shared
+    /// pages or single faces, or a mark at the corner of a plate. Lines of the page overview and of
+    /// other figures have this kind too.
     Align,
 }
 

@@ -1,10 +1,11 @@
 //! Large independent sets in graphs: compatible codes among many candidates.
 //!
 //! The search is a local search with plateau moves (after Andrade, Resende, Werneck, "Fast local search for the
-//! maximum independent set problem", J. Heuristics 2012). A vertex without conflict is added at once. Otherwise, one
-//! with a single conflict replaces the conflicting vertex; of many, the one that has been outside for longest.
-//! Without gain for a while, one to four vertices with few conflicts are forced in, or the search returns to the best
-//! set. It is deterministic for a seed and a number of steps.
+//! maximum independent set problem", J. Heuristics 2012). A vertex without conflict is added at once.
+//! Otherwise, a vertex with a single conflict replaces the conflicting one. If there are several,
+//! the one that has been outside the longest is used. If there is no gain for a while, one to four
+//! vertices with few conflicts are forced in, or the search returns to the best set. The result
+//! depends only on the seed and the number of steps.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -78,9 +79,10 @@ impl ConflictGraph {
         const TABU: u64 = 7;
         /// Number of vertices with one conflict that are compared before each exchange.
         const LOOK_AT: usize = 50;
-        /// Fraction of the steps, and maximum number, without gain after which vertices are forced in.
+        /// Steps without gain after which vertices are forced in: fraction of all steps, and
+        /// maximum.
         const PATIENCE: (u64, u64) = (8, 3_000);
-        /// Loss of vertices compared with the best set at which the search returns to it.
+        /// Loss of vertices, relative to the best set, at which the search returns to that set.
         const TOO_FAR: usize = 3;
         let patience = (steps / PATIENCE.0).clamp(1, PATIENCE.1);
         let mut random = ChaCha8Rng::seed_from_u64(seed);

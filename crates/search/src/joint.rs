@@ -2,8 +2,9 @@
 //!
 //! The number of a code's words that pass the rules is only part of an arrangement's worth. Other words can be
 //! repaired or exchanged, and the number of compatible ones differs between arrangements. So annealing continues with
-//! the number of codes at the end of a short local search. Up to 16 bits the search may exchange any words, whose
-//! conflicts are listed once; beyond, it exchanges words that do not pass for words one cell away.
+//! the number of codes at the end of a short local search. Up to 16 bits the search may exchange any words,
+//! whose conflicts are listed once. For more bits, it exchanges words that do not pass for words
+//! one cell away.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -242,7 +242,7 @@ impl fmt::Display for InlayVerdict {
         let Self { triangles, inlay_mm, plate_mm, white_mm3, black_mm3 } = self;
         let [white, black] = [white_mm3, black_mm3].map(|mm3| mm3 / 1e3);
         write!(f, "verified, two closed bodies of {}, ", counted(*triangles, "triangle"))?;
-        write!(f, "{black:.2} cm³ black {inlay_mm:.2} mm deep in {white:.2} cm³ white")?;
+        write!(f, "{black:.2} cm³ black, {inlay_mm:.2} mm deep, in {white:.2} cm³ white")?;
         plate_mm.map_or(Ok(()), |mm| write!(f, ", {mm:.2} mm thick"))
     }
 }

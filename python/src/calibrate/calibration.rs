@@ -142,8 +142,9 @@ macro_rules! whole {
             ) -> PyResult<PathBuf> {
                 let solved = $solved.clone();
                 if !solved.is_whole() {
-                    let what = "this calibration lacks data for a report: write the report right after calibrating, or, if \
-                                there are no diagnoses, save with residuals=True and load with the target";
+                    let what = "this calibration lacks data for a report: write the report directly after \
+                                calibrating; if there are no diagnoses, you can instead save with \
+                                residuals=True and load with the target";
                     return Err(errors::calibration(what.to_owned()));
                 }
                 let usual = if $is_rig { "rig" } else { "camera" };

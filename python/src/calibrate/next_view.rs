@@ -182,7 +182,7 @@ pub fn next_view(
         (None, ModelChoice(Some(model))) => model.into(),
         (None, ModelChoice(None)) => {
             return Err(wrong(
-                "model auto needs images to choose from; pass the model with the most parameters you consider",
+                "model auto needs images to choose from; pass the candidate model with the most parameters",
             ));
         }
     };

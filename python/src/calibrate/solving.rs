@@ -62,7 +62,7 @@ impl Seen {
                 let size = size(rows, cols)?.map(|(rows, cols)| [rows, cols]);
                 Ok(Self::Grid(UntaggedGrid { kind: tiling(grid)?, edge_mm, size }))
             }
-            _ => wrong("target and grid exclude each other"),
+            _ => wrong("target and grid are mutually exclusive"),
         }
     }
 

@@ -196,7 +196,7 @@ impl Detector {
                 return Err(wrong(what.to_owned()));
             }
             (_, Some(_)) => {
-                return Err(wrong("target and grid exclude each other".to_owned()));
+                return Err(wrong("target and grid are mutually exclusive".to_owned()));
             }
             (targets, None) => {
                 for family in targets.iter().filter_map(|target| target.codes()) {

@@ -211,7 +211,9 @@ pub fn render<'py>(
     let pose = match (pose, eye) {
         (Some(pose), None) if look_at.or(up).is_none() => *pose,
         (Some(_), None) => {
-            return Err(wrong("look_at and up need eye, and exclude pose".to_owned()));
+            return Err(wrong(
+                "look_at and up need eye, and cannot be combined with pose".to_owned(),
+            ));
         }
         (None, Some(eye)) => {
             let places = own.all().map(|(_, corner)| corner.target_mm);

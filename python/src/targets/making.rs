@@ -58,7 +58,7 @@ impl Keywords {
             }
             (Some(_), Some(_)) => {
                 return Err(raised::TargetError::new_err(
-                    "texture_dpi and texture_px exclude each other",
+                    "texture_dpi and texture_px are mutually exclusive",
                 ));
             }
         };

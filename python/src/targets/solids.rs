@@ -223,7 +223,7 @@ fn sheets(per_face: bool, allow_seams: bool) -> PyResult<SolidSheets> {
         (false, true) => Ok(SolidSheets::SeamedNet),
         (true, false) => Ok(SolidSheets::PerFace),
         (true, true) => {
-            Err(errors::argument("allow_seams and per_face exclude each other".to_owned()))
+            Err(errors::argument("allow_seams and per_face are mutually exclusive".to_owned()))
         }
     }
 }

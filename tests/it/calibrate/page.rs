@@ -90,7 +90,7 @@ fn the_page_is_self_contained_with_all_parts_in_order() {
         "Summary",
         "Projection uncertainty",
         "Residuals and coverage",
-        "In space",
+        "3D view",
         "Distortion",
         "Undistorted image",
         "Models",

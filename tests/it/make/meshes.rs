@@ -121,7 +121,10 @@ fn changed_bodies_are_rejected() {
         ),
         (verdict_on(|bodies| bodies.white.triangles.push([0, 1, 2])), "white body: triangles that"),
         (verdict_on(|bodies| moved(&mut bodies.black, 0.03 * DVec3::X)), "overlap, or leave"),
-        (verdict_on(|bodies| bodies.black.vertices_mm[0].x += 0.1), "neither on a face nor a wall"),
+        (
+            verdict_on(|bodies| bodies.black.vertices_mm[0].x += 0.1),
+            "not on a face, a wall or the floor",
+        ),
         (verdict_on(|bodies| std::mem::swap(&mut bodies.white, &mut bodies.black)), "FAILED"),
         (
             verdict_on(|bodies| {
@@ -135,7 +138,7 @@ fn changed_bodies_are_rejected() {
                     body.vertices_mm.iter_mut().for_each(|v| *v *= 1.001);
                 }
             }),
-            "neither on a face",
+            "not on a face",
         ),
     ] {
         assert!(verdict.contains("FAILED") && verdict.contains(expected), "{expected}: {verdict}");

@@ -13,13 +13,13 @@ use crate::problem::shape::Shape;
 /// Relative change below which a prior has converged.
 const SAME_PRIOR: f64 = 0.05;
 
-/// Most rounds in which offsets and their prior are fitted to each other.
+/// Maximum number of iterations in which offsets and their prior are estimated alternately.
 const PRIOR_ROUNDS: usize = 10;
 
-/// Most rounds for the knots of a spline, which are shorter.
+/// Maximum number of iterations for the knots of a spline, which take less time.
 const KNOT_ROUNDS: usize = 15;
 
-/// Relative change below which the size of second differences has converged.
+/// Relative change below which the standard deviation of the second differences has converged.
 const SAME_SIZE: f64 = 0.1;
 
 impl Calibration {
@@ -56,7 +56,7 @@ impl Calibration {
         settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)
     }
 
-    /// Estimates the shape of the sheet too, and the F ratio of its effect.
+    /// Also estimates the shape of the sheet, and the F ratio of its effect.
     pub(crate) fn bent(
         &self,
         gross: &Gross,
@@ -76,7 +76,7 @@ impl Calibration {
         Ok((settled, f_ratio))
     }
 
-    /// Estimates the position of every corner of the target too.
+    /// Also estimates the position of every corner of the target.
     pub(crate) fn measured(
         &self,
         gross: &Gross,

@@ -83,22 +83,23 @@ pub struct Moved {
     pub rotation_rad: f64,
 }
 
-/// Least number of outliers for a finding: fewer may coincide by chance.
+/// Minimum number of outliers for a finding; fewer may coincide randomly.
 const MIN_OUTLIERS: usize = 6;
 
-/// Least fraction of outliers among the corners of a finding.
+/// Minimum fraction of outliers among the corners of a finding.
 const MOST: f64 = 0.5;
 
-/// Greatest fraction of outliers among the other corners, relative to that fraction.
+/// Maximum fraction of outliers among the other corners, relative to that fraction.
 const ELSEWHERE: f64 = 0.5;
 
-/// Least excess of outliers in standard deviations of the count: chance exceeds it hardly once in a million groups.
+/// Minimum excess of outliers, in standard deviations of the count. Noise exceeds it less than once
+/// in a million groups.
 const SIGNIFICANT: f64 = 5.0;
 
 /// Number of cells along the longer side of the image in which outliers are counted.
 const CELLS: f64 = 8.0;
 
-/// Least number of views with outliers in a region of the image.
+/// Minimum number of views with outliers in a region of the image.
 const MIN_VIEWS: usize = 3;
 
 /// Index of a camera, and a cell of its image.
@@ -121,7 +122,7 @@ impl Count {
         self.outliers as f64 / self.corners.max(1) as f64
     }
 
-    /// Whether most of these corners are outliers, but few of the others among `all`.
+    /// Whether most of these corners are outliers, but few of the other corners in `all` are.
     pub(super) fn stands_out(self, all: Count) -> bool {
         let others =
             Count { outliers: all.outliers - self.outliers, corners: all.corners - self.corners };
@@ -131,7 +132,7 @@ impl Count {
             && others.share() <= ELSEWHERE * self.share()
     }
 
-    /// Whether the fraction of outliers is significantly larger than among the others.
+    /// Whether the fraction of outliers is significantly larger than that among the others.
     pub(super) fn exceeds(self, others: Count) -> bool {
         let (count, chance) = (self.corners as f64, others.share());
         let more = count * (self.share() - chance);
@@ -159,7 +160,7 @@ pub(super) fn shared_outliers(
             all.add(outlier);
             cameras.entry(block.camera).or_default().add(outlier);
             views.entry((block.camera, block.frame)).or_default().add(outlier);
-            // The predicted position: wrong positions are anywhere.
+            // Uses the predicted position, because wrong detected positions may be anywhere.
             let Some(off) = problem.residual(block, corner) else { continue };
             let cell = ((corner.pixel - off) / cell_px).floor().as_ivec2().to_array();
             let (count, of_views) = cells.entry((block.camera, cell)).or_default();

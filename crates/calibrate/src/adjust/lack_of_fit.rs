@@ -1,14 +1,14 @@
 //! Patterns in the residuals that noise does not explain.
 //!
 //! ```text
-//!   over the image    the mean residual of a cell, against how it differs between views
-//!   over the target   the move of a corner in space that explains its residuals in all views best,
-//!                     against what is left; the same of a panel as a whole
+//!   over the image    the mean residual of a cell, relative to its variation between views
+//!   over the target   the displacement of a corner in space that explains its residuals in all
+//!                     views best, relative to the remainder; the same for a whole panel
 //! ```
 //!
 //! Both are analyses of variance: F is the sum of squares that a pattern explains, per unknown, over the remainder, per
-//! degree of freedom. Cameras and poses have already absorbed a part of every pattern, so F is too small rather than
-//! too large. Outliers are excluded.
+//! degree of freedom. Cameras and poses have already absorbed a part of every pattern, so F is
+//! underestimated. Outliers are excluded.
 
 use std::collections::BTreeMap;
 
@@ -23,25 +23,29 @@ use crate::problem::whitening::Whitening;
 /// rim, and a cell is well within one of them.
 const CELLS: f64 = 16.0;
 
-/// Normal deviate that is exceeded once in a thousand times.
+/// Normal deviate that is exceeded once in a thousand cases.
 pub(crate) const SIGNIFICANT: f64 = 3.09;
 
-/// Size of a pattern relative to the remaining noise from which it matters. Standard deviations assume independent
-/// residuals, but a pattern is the same in all views and does not average out. At half of the noise, it outweighs the
-/// noise in a parameter as soon as a few corners bear on it.
+/// Size of a pattern, relative to the remaining noise, above which it matters. Standard deviations
+/// assume independent residuals, but a pattern is the same in all views and does not average out.
+/// At half of the noise, it outweighs the noise in a parameter as soon as a few corners determine
+/// that parameter.
 pub(crate) const MATTERS: f64 = 0.5;
 
-/// Significance of the displacement of one among many panels: chance exceeds it hardly once in a million.
+/// Minimum significance of the displacement of one of many panels. Noise exceeds it less than once
+/// in a million cases.
 const SIGNIFICANT_PANEL: f64 = 5.0;
 
-/// Least number of panels for identifying a displaced one.
+/// Minimum number of panels for identifying a displaced one.
 const MIN_PANELS: usize = 3;
 
-/// Least sensitivity to a displacement of a corner, relative to the best direction; the information is its square.
-/// Below it all views came from the same side, and the direction is not estimated.
+/// Minimum sensitivity to a displacement of a corner, relative to the best direction; the
+/// information is its square. Below it, all views were taken from the same side, and the direction
+/// is not estimated.
 const BLIND: f64 = 0.03;
 
-/// Least number of views of a corner: each has two coordinates, and the displacement three.
+/// Minimum number of views of a corner: each view has two coordinates, and the displacement has
+/// three.
 const MIN_VIEWS: usize = 3;
 
 /// A pattern that noise does not explain, and that matters compared with the noise.
@@ -61,7 +65,8 @@ pub enum LackOfFit {
         panel: PanelRef,
         /// RMS of the pattern per axis, px.
         rms_px: f64,
-        /// RMS displacement of the corners in space, mm, without what poses and camera absorb.
+        /// RMS displacement of the corners in space, mm, without the part that poses and camera
+        /// absorb.
         rms_mm: f64,
     },
 }
@@ -104,8 +109,9 @@ struct Explained {
     moves: [f64; 3],
 }
 
-/// Finds the patterns in a problem's residuals, the strongest first. Each is subtracted before weaker ones are sought:
-/// corners of the board and positions in the image coincide if all views are similar.
+/// Finds the patterns in a problem's residuals, the strongest first. Each is subtracted before the
+/// search for weaker ones, because corners of the board and positions in the image coincide if all
+/// views are similar.
 pub(crate) fn lack_of_fit(problem: &Problem, whitening: &Whitening) -> Vec<LackOfFit> {
     let (mut seen, px) = seen(problem, whitening);
     let mut open: Vec<Source> = (0..problem.cameras.len()).map(Source::Lens).collect();
@@ -247,7 +253,7 @@ fn over_panels(seen: &[Seen]) -> Explained {
         panels.entry(corner.panel).or_default().push(index);
     }
     let mut found = Explained::default();
-    // Of two panels it is unknown which one is wrong, and a single one has no reference.
+    // With two panels, it is unknown which one is wrong. A single panel has no reference.
     if panels.len() < MIN_PANELS {
         return found;
     }
@@ -255,7 +261,7 @@ fn over_panels(seen: &[Seen]) -> Explained {
         let places = || views.iter().map(|&index| seen[index].position_mm);
         let middle = places().sum::<DVec3>() / views.len() as f64;
         let reach = places().map(|at| at.distance(middle)).fold(f64::MIN_POSITIVE, f64::max);
-        // Rotations as lengths at the rim, so that all unknowns have the same unit.
+        // Expresses rotations as lengths at the rim, so that all unknowns have the same unit.
         let arm = |seen: &Seen| (seen.position_mm - middle) / reach;
         let row = |by: DVec3, seen: &Seen| {
             let turn = arm(seen).cross(by);
@@ -364,8 +370,8 @@ impl Explained {
     }
 }
 
-/// The normal deviate of the same probability as a value of the F distribution, by Paulson's cube-root approximation;
-/// NaN without degrees of freedom.
+/// The normal deviate with the same probability as a value of the F distribution, from Paulson's
+/// cube-root approximation; NaN without degrees of freedom.
 pub(crate) fn deviate_of_f(f_ratio: f64, unknowns: f64, freedom: f64) -> f64 {
     let (a, b) = (2.0 / (9.0 * unknowns), 2.0 / (9.0 * freedom));
     let root = f_ratio.cbrt();

@@ -1,8 +1,8 @@
-//! Iteratively reweighted adjustment: estimates the weights of corners, the set of corners that count, and the unknowns
-//! alternately until they are consistent.
+//! Iteratively reweighted adjustment: alternately estimates the weights of the corners, the set of
+//! inliers, and the unknowns, until they are consistent.
 //!
-//! Robust losses are M-estimators. Gross outliers, beyond a gap in the distribution of residuals, are excluded; smooth
-//! residuals, as an unsuitable lens model leaves, are not.
+//! Robust losses are M-estimators. Gross outliers, beyond a gap in the distribution of residuals,
+//! are excluded. Smooth residuals, which an unsuitable lens model leaves, are not.
 
 use std::collections::BTreeMap;
 
@@ -17,26 +17,29 @@ use crate::problem::bundle::Problem;
 use crate::problem::unknowns::Block;
 use crate::problem::whitening::{OUTLIER_SIGMA, Whitening, deviations, residuals};
 
-/// Least number of rounds in which weights and solution are fitted to each other; the third changes
-/// no significant digit.
+/// Minimum number of iterations in which weights and solution are estimated alternately; the third
+/// changes no significant digit.
 const WEIGHT_ROUNDS: usize = 3;
 
-/// Most rounds until the set of corners that count is stable; a corner at the limit may change
-/// sides for ever.
+/// Maximum number of iterations until the set of inliers is stable; a corner at the limit may
+/// change sides forever.
 const MAX_ROUNDS: usize = 12;
 
-/// Least size of a gross outlier, in standard deviations. Beyond [`OUTLIER_SIGMA`] a corner is called an outlier.
+/// Minimum size of a gross outlier, in standard deviations. Beyond [`OUTLIER_SIGMA`], a corner is
+/// called an outlier.
 const GROSS_SIGMA: f64 = 2.0 * OUTLIER_SIGMA;
 
-/// Greatest number of corners in the gap before the gross outliers, relative to the number beyond it; the gap reaches
-/// from half the limit to the limit. A lens that the model does not fit well leaves a tail of residuals at its rim
-/// instead, with more corners nearer than farther; excluding the rim would make the fit there ever worse.
+/// Maximum number of corners in the gap before the gross outliers, relative to the number beyond
+/// it; the gap extends from half the limit to the limit. A lens that the model does not fit well
+/// has no gap, but a tail of residuals at its rim, with fewer corners at larger residuals.
+/// Excluding the rim would make the fit there worse and worse.
 const IN_THE_GAP: f64 = 0.25;
 
-/// Lens model errors are smooth: more than the fraction `SMOOTH` of the neighbours of corners with large residuals have
-/// residuals towards the same side, of more than the fraction `FALLS_OFF` of the size and of more than
-/// `MIN_SMOOTH_SIGMA` standard deviations. Wrong positions are not smooth; for labels or corners that are displaced
-/// together, only the displaced corners are such neighbours.
+/// Lens model errors are smooth. Consider the neighbours of corners with large residuals. More than
+/// the fraction `SMOOTH` of them have residuals towards the same side, larger than the fraction
+/// `FALLS_OFF` of that residual and than `MIN_SMOOTH_SIGMA` standard deviations. Wrong positions
+/// are not smooth. For labels or corners that are displaced together, only the displaced corners
+/// have residuals like these.
 const SMOOTH: f64 = 0.5;
 const FALLS_OFF: f64 = 0.05;
 const MIN_SMOOTH_SIGMA: f64 = 3.0;
@@ -47,16 +50,17 @@ pub(crate) struct Kept {
     pub problem: Problem,
     /// Excluded blocks.
     pub left_out: Vec<bool>,
-    /// Whether gross outliers stand out from the start. They must then have no influence even in the first round: if
-    /// two fifths of the corners are displaced together, they bias the estimate so much that they no longer stand out.
+    /// Whether gross outliers stand out already at the start. They must then have no influence even
+    /// in the first round: if two fifths of the corners are displaced together, they bias the
+    /// estimate so much that they no longer stand out.
     pub some_stand_out: bool,
 }
 
-/// A consistent solution of weights, set of corners that count, and unknowns.
+/// A consistent solution for the weights, the set of inliers, and the unknowns.
 pub(crate) struct Settled {
-    /// The minimum over the corners that count.
+    /// The minimum over the inliers.
     pub minimum: Minimum,
-    /// The whitening of the corners that count.
+    /// The whitening of the inliers.
     pub whitening: Whitening,
     /// The same unknowns with all corners.
     pub problem: Problem,
@@ -64,8 +68,9 @@ pub(crate) struct Settled {
     pub outliers: Vec<Vec<bool>>,
 }
 
-/// Minimises with weights that are consistent with the residuals at the minimum. Gross outliers and excluded blocks are
-/// not used, so standard deviations describe the corners that are; with [`Loss::Squared`] every corner is used.
+/// Minimises with weights that are consistent with the residuals at the minimum. Gross outliers and
+/// excluded blocks are not used, so standard deviations describe only the corners that are used.
+/// With [`Loss::Squared`], every corner is used.
 ///
 /// # Errors
 /// Returns an error if the normal equations cannot be formed or solved from the initial values.
@@ -91,8 +96,9 @@ pub(super) fn settle(
     }
     let mut part = counting(&all, &gross);
     let mut whitening = Whitening::fit(&part, weights, &residuals(&part));
-    // In the first round all corners count except those that stand out, so that a lens is judged
-    // with its rim. With equal weights and squared loss, reweighting changes nothing.
+    // In the first iteration, all corners are used except those that stand out, so that the fit
+    // includes the rim of the lens. With equal weights and squared loss, reweighting changes
+    // nothing.
     let rounds = match whitening.common_px.is_some() || loss != Loss::Squared {
         true => MAX_ROUNDS,
         false => 0,
@@ -123,7 +129,8 @@ pub(super) fn settle(
     Ok(Settled { minimum, whitening, problem, outliers })
 }
 
-/// Marks the gross outliers of each block. Every frame keeps at least its nearest corners, as many as a pose needs.
+/// Marks the gross outliers of each block. Every frame keeps at least the corners with the smallest
+/// residuals, as many as a pose needs.
 pub(super) fn with_gross_errors(
     problem: &Problem,
     left_out: &[bool],
@@ -162,8 +169,8 @@ pub(super) fn with_gross_errors(
     gross
 }
 
-/// For every gross outlier: the number of neighbours with a residual towards the same side and of comparable size, and
-/// the number of neighbours. Zero for all other corners.
+/// For every gross outlier: the number of neighbours with a residual towards the same side and of
+/// comparable size, and the number of all neighbours. Both are zero for all other corners.
 fn smooth_neighbours(
     problem: &Problem,
     block: &Block,
@@ -189,7 +196,8 @@ fn smooth_neighbours(
     block.observations.iter().enumerate().map(of_corner).collect()
 }
 
-/// The whitened residual from which outliers are gross: the first gap; `f64::MAX` without one.
+/// The whitened residual above which outliers are gross: the first gap, or `f64::MAX` if there is
+/// no gap.
 fn gross_limit(off: &[f64], sigma: f64) -> f64 {
     let beyond = |limit: f64| off.iter().filter(|&&off| off > limit).count() as f64;
     let mut limit = GROSS_SIGMA * sigma;
@@ -207,15 +215,15 @@ fn gross_limit(off: &[f64], sigma: f64) -> f64 {
 }
 
 /// The variance factor by which the inverse of the normal equations is multiplied to give the
-/// covariance; for a robust loss by the asymptotic formula of an M-estimator (Huber & Ronchetti
+/// covariance; for a robust loss, from the asymptotic formula of an M-estimator (Huber & Ronchetti
 /// 2009, 7.6),
 ///
 /// ```text
 ///     σ² = Σψ² / (2N − p) · mean w / (mean ψ′)²
 /// ```
 ///
-/// with the influence ψ = w e of each coordinate. Where every corner counts in full, this is the
-/// sum of squares divided by the degrees of freedom.
+/// with the influence ψ = w e of each coordinate. If every corner counts in full, this is the sum
+/// of squares divided by the degrees of freedom.
 pub(crate) fn variance(minimum: &Minimum, whitening: &Whitening, loss: Loss) -> f64 {
     let Minimum { problem, normal, layout, .. } = minimum;
     // Priors on corner offsets add as many observations as there are unknowns.

@@ -1,5 +1,5 @@
-//! Consistency of views: which views contradict the camera of all others because zoom, focus or
-//! crop changed.
+//! Consistency of views: finds the views that contradict the camera of all others because zoom,
+//! focus or crop changed.
 //!
 //! At the minimum the gradients of all views with respect to the camera sum to zero. With S = Σ Sᵥ
 //! the reduced normal equations (Schur complement), the gradient s of a consistent view has the
@@ -9,9 +9,10 @@
 //!     T = sᵀ (Sᵥ − Sᵥ S⁻¹ Sᵥ)⁺ s
 //! ```
 //!
-//! is χ² distributed with as many degrees of freedom as the view determines of the camera. This is the Chow test (Chow
-//! 1960) of whether the camera of this view is that of all others. An inconsistent view increases the statistic of all
-//! views until it is removed; lack of fit of the model increases it in any case, and then no single view is to blame.
+//! is χ² distributed. Its degrees of freedom are the number of camera parameters that the view
+//! determines. This is the Chow test (Chow 1960) of whether this view has the same camera as all
+//! others. An inconsistent view increases the statistic of all views until it is removed. Lack of
+//! fit of the model always increases it, and is not due to a single view.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -26,27 +27,28 @@ use crate::problem::bundle::Problem;
 use deltille_core::damping::Damping;
 use deltille_core::statistics::median;
 
-/// Least number of views for the test: three remain without the tested one.
+/// Minimum number of views for the test: three remain without the tested one.
 const MIN_VIEWS: usize = 4;
 
-/// Least information on a direction of the camera parameters. A direction is undetermined if all views together
-/// contribute less than the fraction `OPEN` of the best direction. It is not tested if the view, or all others,
-/// contribute less than the fraction `MIN_PART` of it.
+/// Minimum information about a direction of the camera parameters. A direction is undetermined if
+/// all views together contribute less than the fraction `OPEN` of the best direction. It is not
+/// tested if the view, or all others, contribute less than the fraction `MIN_PART` of it.
 const OPEN: f64 = 1e-9;
 const MIN_PART: f64 = 1e-3;
 
-/// Views mostly agree when the median of T, divided by its degrees of freedom, is below this: 0.9
+/// Most views agree if the median of T, divided by its degrees of freedom, is below this limit; 0.9
 /// is usual.
 const AGREEING: f64 = 1.5;
 
-/// Significance from which a view is inconsistent, in standard deviations relative to the scatter of all views: chance
-/// exceeds it hardly once in a million views.
+/// Significance above which a view is inconsistent, in standard deviations relative to the scatter
+/// of all views. Noise exceeds it less than once in a million views.
 const SIGNIFICANT: f64 = 5.0;
 
-/// Least shift of the camera by an inconsistent view, in its standard deviations.
+/// Minimum shift of the camera parameters due to an inconsistent view, in their standard
+/// deviations.
 const HARMFUL: f64 = 1.0;
 
-/// Efficiency of the median relative to the mean, for squares.
+/// Statistical efficiency of the median relative to the mean, for squares.
 const EFFICIENCY: f64 = 0.64;
 
 /// The test of one view against all others.
@@ -55,7 +57,7 @@ struct Pull {
     /// T divided by its degrees of freedom, in units of the variance of residuals.
     statistic: f64,
     freedom: f64,
-    /// Shift of the camera without the view, in its standard deviations.
+    /// Shift of the camera parameters if the view is left out, in their standard deviations.
     moves: f64,
 }
 
@@ -113,7 +115,7 @@ impl Consistency {
     }
 }
 
-/// The test of each frame; `None` for a frame that determines nothing on its own.
+/// The test of each frame; `None` for a frame that alone determines nothing.
 fn pulls(settled: &Settled, loss: Loss) -> Option<Vec<Option<Pull>>> {
     let problem = &settled.minimum.problem;
     if problem.cameras.iter().any(|camera| camera.roughness.is_some()) {
@@ -132,7 +134,7 @@ fn pulls(settled: &Settled, loss: Loss) -> Option<Vec<Option<Pull>>> {
     Some((0..problem.frames.len()).into_par_iter().map(of_frame).collect())
 }
 
-/// The same for cameras with a spline: a frame determines only some of its knots.
+/// The same for cameras with a spline lens, because a frame determines only some knots.
 fn pulls_of_some(settled: &Settled, loss: Loss) -> Option<Vec<Option<Pull>>> {
     let problem = &settled.minimum.problem;
     let all = settled.minimum.normal.covariance_of_kept()?;
@@ -146,7 +148,8 @@ fn pulls_of_some(settled: &Settled, loss: Loss) -> Option<Vec<Option<Pull>>> {
     Some((0..problem.frames.len()).into_par_iter().map(of_frame).collect())
 }
 
-/// The reduced normal equations (Schur complement) of a single frame, without priors: matrix and right side.
+/// The reduced normal equations (Schur complement) of a single frame, without priors: matrix and
+/// right-hand side.
 fn reduced_of(
     problem: &Problem,
     settled: &Settled,

@@ -10,10 +10,12 @@
 //!      └─→ a view that contradicts the camera of all others (Chow test) is removed; back to settled
 //! ```
 //!
-//! Outliers bias the estimate of correct corners, least at the smallest scale of the loss that still covers most
-//! corners. So the scale is reduced step by step before anything is called wrong. If many corners are displaced
-//! together, the iteration may end between the two groups of corners; from there it follows the nearest corners of
-//! every frame, which mostly belong to the larger group. All decisions assume that most corners are correct.
+//! Outliers bias the estimate. The bias is smallest at the smallest scale of the loss that still
+//! includes most corners. So the scale is reduced step by step before anything is classified as
+//! wrong. If many corners are displaced together, the iteration may end between the two groups of
+//! corners. From there, it continues with the corners of every frame that have the smallest
+//! residuals, which mostly belong to the larger group. All decisions assume that most corners are
+//! correct.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -40,31 +42,33 @@ use deltille_core::statistics::median;
 /// between two groups of corners.
 const NARROW: f64 = 0.5;
 
-/// The reduction ends when a round leaves more than this fraction of the scale, or after
-/// [`MAX_ROUNDS`].
+/// The reduction ends if an iteration reduces the scale to more than this fraction of its value, or
+/// after [`MAX_ROUNDS`].
 const STILL: f64 = 0.98;
 const MAX_ROUNDS: usize = 12;
 
-/// Fraction of the corners of each frame that are followed from between two groups, as most corners
-/// are right.
+/// Fraction of the corners of each frame that are used to leave an estimate between two groups;
+/// most corners are right.
 const FOLLOWED: f64 = 0.5;
 
-/// There were two groups of corners if following leaves less than this fraction of the scale: noise
-/// alone hardly shrinks.
+/// There were two groups of corners if this reduces the scale to less than this fraction of its
+/// value. With noise alone, the scale hardly shrinks.
 const SHRUNK: f64 = 0.5;
 
-/// Least number of panels for identifying a wrong one: of two it is not known which.
+/// Minimum number of panels for identifying a wrong one: with two panels, it is not known which one
+/// is wrong.
 const MIN_PANELS: usize = 3;
 
-/// Distance beyond the image, in image sizes, from which a corner cannot have been seen in it.
+/// Distance beyond the image, in image sizes, at which a corner cannot have been detected in this
+/// image.
 const BEYOND: f64 = 1.0;
 
-/// Ratio of the median residual of one camera in one frame to the usual median from which the corners contradict the
-/// others. Blur, light and distance change it by a small factor; labels that are off by a tile, and images not taken at
-/// the same time, by about a hundred.
+/// Ratio of the median residual of one camera in one frame to the usual median, above which the
+/// corners contradict the others. Blur, light and distance change it by a small factor; labels that
+/// are off by a tile, and images not taken at the same time, by about a hundred.
 const WRONG_RATIO: f64 = 10.0;
 
-/// Least median residual of wrong corners, px: every detected corner is located to a pixel.
+/// Minimum median residual of wrong corners, px: every detected corner is accurate to a pixel.
 const WRONG_PX: f64 = 1.0;
 
 /// A problem at the estimate on which most of its corners agree, and the parts that contradict it.
@@ -94,7 +98,7 @@ struct Agreed {
     some_stand_out: bool,
 }
 
-/// One frame in this many may show another camera; with more, it is unclear which ones do.
+/// One in this many frames may show another camera; with more, it is unclear which ones do.
 const FEW: usize = 10;
 
 /// Why a frame is excluded.
@@ -112,8 +116,8 @@ pub(crate) enum WrongFrame {
 }
 
 impl Gross {
-    /// Estimates where most corners of a problem agree, and finds the parts that do not; `None`
-    /// where nothing can be adjusted.
+    /// Computes the estimate on which most corners of a problem agree, and finds the parts that do
+    /// not; `None` if nothing can be adjusted.
     pub(crate) fn of(problem: Problem) -> Option<Self> {
         agree(problem).map(|(agreed, panels)| Self::without(agreed, panels))
     }
@@ -164,8 +168,8 @@ impl Gross {
         Self { problem, left_out, frames, usual_px, panels, off_px, some_stand_out }
     }
 
-    /// Adjusts the parts that agree, after `prepare`. A panel that looked wrong may be right once outliers have been
-    /// removed; it is then included again.
+    /// Adjusts the parts that agree, after `prepare`. A panel that seemed wrong may fit after
+    /// outliers have been removed; it is then included again.
     ///
     /// # Errors
     /// Returns an error if nothing can be adjusted.
@@ -203,7 +207,8 @@ impl Gross {
         let before = self.frames.clone();
         let mut without = None;
         for _ in 0..=most {
-            // Displaced panels, a bent board, or an unsuitable lens model make views contradict each other, too.
+            // Displaced panels, a bent board, or an unsuitable lens model also make views
+            // contradict each other.
             let now = without.as_ref().unwrap_or(&settled);
             let can_test = self.panels.is_empty() && has_no_pattern(now);
             let Some(consistency) = can_test.then(|| Consistency::of(now, loss)).flatten() else {
@@ -313,7 +318,7 @@ fn limit_px(medians: &[f64]) -> f64 {
     f64::max(WRONG_RATIO * median(medians.to_vec()).unwrap_or(0.0), WRONG_PX)
 }
 
-/// The lower quartile of the lengths of the residuals, px: with wrong labels not even a quarter of
+/// The lower quartile of the lengths of the residuals, px. With wrong labels, not even a quarter of
 /// the corners fit.
 fn nearest_px(residuals: &[DVec2]) -> f64 {
     let mut off: Vec<f64> = residuals.iter().map(|r| r.x.hypot(r.y)).collect();
@@ -335,7 +340,8 @@ fn mirrored(problem: &Problem) -> Vec<usize> {
     (0..sides.len()).filter(|&block| sides[block] * most < 0.0).collect()
 }
 
-/// Estimates where most corners agree, without the panels that contradict most others.
+/// Computes the estimate on which most corners agree, without the panels that contradict most
+/// others.
 fn agree(problem: Problem) -> Option<(Agreed, BTreeSet<PanelRef>)> {
     let seen: BTreeSet<PanelRef> = problem.blocks.iter().map(|block| block.panel).collect();
     let mut wrong: BTreeSet<PanelRef> = BTreeSet::new();
@@ -346,7 +352,7 @@ fn agree(problem: Problem) -> Option<(Agreed, BTreeSet<PanelRef>)> {
     let mut agreed = all.clone();
     while let Some(panel) = worst_panel(&agreed.problem, agreed.sigma, &wrong) {
         wrong.insert(panel);
-        // If half of the panels are wrong, it is another target.
+        // If half of the panels are wrong, the images show another target.
         if 2 * wrong.len() >= seen.len() {
             return Some((all, BTreeSet::new()));
         }
@@ -355,8 +361,8 @@ fn agree(problem: Problem) -> Option<(Agreed, BTreeSet<PanelRef>)> {
     Some((agreed, wrong))
 }
 
-/// Estimates where most corners agree without the panels in `wrong`. Frames that show these first get new poses, as the
-/// wrong panels biased them.
+/// Computes the estimate on which most corners agree without the panels in `wrong`. Frames that
+/// show these panels get new poses first, because the wrong panels biased their poses.
 fn agreed_without(mut problem: Problem, wrong: &BTreeSet<PanelRef>) -> Option<Agreed> {
     let of_wrong = problem.blocks.iter().filter(|block| wrong.contains(&block.panel));
     let frames: BTreeSet<usize> = of_wrong.map(|block| block.frame).collect();
@@ -415,8 +421,8 @@ fn panel_counts(problem: &Problem, sigma: f64) -> BTreeMap<PanelRef, Count> {
     counts
 }
 
-/// The panel with the largest share of outliers among those not yet known to be wrong, if it stands
-/// out.
+/// Of the panels not yet known to be wrong, the one with the largest fraction of outliers, if it
+/// stands out.
 fn worst_panel(problem: &Problem, sigma: f64, wrong: &BTreeSet<PanelRef>) -> Option<PanelRef> {
     let mut counts = panel_counts(problem, sigma);
     counts.retain(|panel, _| !wrong.contains(panel));
@@ -425,7 +431,8 @@ fn worst_panel(problem: &Problem, sigma: f64, wrong: &BTreeSet<PanelRef>) -> Opt
     most.max_by(|a, b| a.1.share().total_cmp(&b.1.share())).map(|(panel, _)| panel)
 }
 
-/// Estimates where most corners agree, with a redescending loss whose scale shrinks in every round.
+/// Computes the estimate on which most corners agree, with a redescending loss whose scale shrinks
+/// in every iteration.
 fn narrowed(mut problem: Problem) -> Option<Agreed> {
     let mut sigma = f64::INFINITY;
     for _ in 0..MAX_ROUNDS {
@@ -447,8 +454,8 @@ fn narrowed(mut problem: Problem) -> Option<Agreed> {
     Some(Agreed { problem, sigma: whitening.sigma, some_stand_out })
 }
 
-/// Re-estimates from the nearest corners of every frame, away from an estimate between two groups
-/// of corners; `None` if there is only one group.
+/// Computes a new estimate from the corners with the smallest residuals of every frame, if the
+/// estimate is between two groups of corners; `None` if there is only one group.
 fn to_larger_group(problem: &Problem) -> Option<(Problem, Whitening)> {
     let between = scale(problem);
     let (mut found, mut whitening) = (problem.clone(), between.clone());
@@ -464,7 +471,8 @@ fn to_larger_group(problem: &Problem) -> Option<(Problem, Whitening)> {
     (whitening.sigma < SHRUNK * between.sigma).then_some((found, whitening))
 }
 
-/// Marks the nearest corners of each frame: the fraction [`FOLLOWED`], or as many as a pose needs.
+/// Marks the corners with the smallest residuals of each frame: the fraction [`FOLLOWED`], or as
+/// many as a pose needs.
 fn nearest_of_frames(problem: &Problem, whitening: &Whitening) -> Vec<Vec<bool>> {
     let off = deviations(problem, whitening);
     let mut of_frames = vec![Vec::new(); problem.frames.len()];
@@ -483,8 +491,9 @@ fn nearest_of_frames(problem: &Problem, whitening: &Whitening) -> Vec<Vec<bool>>
     problem.blocks.iter().zip(&off).map(of_block).collect()
 }
 
-/// The displacement of an excluded panel: the difference of its stated pose from the pose that its own corners
-/// determine while the inliers of all others count. `None` if no pose explains its corners.
+/// The displacement of an excluded panel: the difference between its stated pose and the pose that
+/// its own corners determine together with the inliers of all other panels. `None` if no pose
+/// explains its corners.
 fn moved(settled: &Settled, panel: PanelRef) -> Option<Moved> {
     let Settled { problem, whitening, outliers, .. } = settled;
     let of_panel = || problem.blocks.iter().filter(|block| block.panel == panel);
@@ -523,8 +532,8 @@ fn moved(settled: &Settled, panel: PanelRef) -> Option<Moved> {
     })
 }
 
-/// The views of a camera without the corners that lie far outside their images, and a finding for each view that had
-/// such corners. Views with too few corners left are omitted.
+/// The views of a camera without the corners that lie far outside their images, and a finding for
+/// each view that had corners like these. Views with too few corners left are omitted.
 pub(crate) fn within_pictures(views: &[View], camera: usize) -> (Vec<View>, Vec<Finding>) {
     let mut found = Vec::new();
     let of_view = |view: &View| {

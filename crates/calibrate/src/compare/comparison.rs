@@ -9,10 +9,12 @@
 //!     |d|² / Σᵢ (λᵢ + ε²)                       λᵢ: variances of d in independent directions
 //! ```
 //!
-//! with d over all positions in the region, and ε the accuracy that no calibration exceeds. The test is the ratio of
-//! the two reported numbers. Covariances from few frames are known too roughly in single directions for a test of each.
+//! with d over all positions in the region, and ε the best accuracy of any calibration. The test
+//! statistic is the ratio of the two reported numbers. Covariances from few frames are too
+//! uncertain in single directions to test each direction.
 //!
-//! Both calibrations are assumed to use one board: the effect of its errors on both is not a difference.
+//! Both calibrations are assumed to use the same board, so the effect of its errors on both does
+//! not count as a difference.
 
 use std::collections::BTreeMap;
 
@@ -32,15 +34,16 @@ use deltille_core::targets::{check_result_of, check_same_board};
 /// Number of grid positions along the longer side of the image.
 const POSITIONS: usize = 40;
 
-/// Least number of corners in a cell and its neighbours for a cell to count as seen: single corners at the border of an
-/// image carry little information.
+/// Minimum number of corners in a cell and its neighbours for a cell to count as covered, because
+/// single corners at the border of an image carry little information.
 const AROUND: usize = 5;
 
-/// Most iterations of the motion, and the change at which it has converged.
+/// Maximum number of iterations for the motion, and the change at which it has converged.
 const MAX_STEPS: usize = 50;
 const SAME_PX: f64 = 1e-9;
 
-/// Least standard deviation of a calibration, px: neither lens nor sensor follow their model exactly.
+/// Minimum standard deviation of a calibration, px: neither lens nor sensor follows its model
+/// exactly.
 const MIN_SD_PX: f64 = 1e-3;
 
 /// Significance level of the test that the camera has changed.
@@ -49,7 +52,7 @@ const SELDOM: f64 = 1e-3;
 /// The region of the image in which two cameras are compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Region {
-    /// Where both saw corners; everywhere if that is not known.
+    /// The area where both detected corners; the whole image if that area is not known.
     #[default]
     Seen,
     /// The whole image.
@@ -58,7 +61,7 @@ pub enum Region {
     Within(DVec2, DVec2),
 }
 
-/// The difference of two cameras; by default without any positions.
+/// The difference between two cameras; by default without any positions.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Comparison {
@@ -66,7 +69,8 @@ pub struct Comparison {
     pub distance_mm: Option<f64>,
     /// Number of grid positions along a row of the image.
     pub columns: usize,
-    /// The difference of the second camera, row by row; `None` beyond one of the lenses.
+    /// The difference of the second camera from the first, row by row; `None` beyond the field of
+    /// view of either lens.
     pub positions: Vec<Option<Difference>>,
     /// The motion from the view of the first camera to that of the second: a rotation, and for points that are not at
     /// infinity a translation.
@@ -75,7 +79,7 @@ pub struct Comparison {
     pub rms_px: f64,
     /// The RMS difference expected from the uncertainties of both; `None` if they are not known.
     pub expected_px: Option<f64>,
-    /// Probability that an unchanged camera shows such a difference.
+    /// Probability that an unchanged camera shows a difference at least this large.
     pub p_value: Option<f64>,
     /// Whether the uncertainty of the first and of the second camera is missing.
     pub lacks_uncertainty: [bool; 2],
@@ -108,7 +112,7 @@ pub enum ComparisonError {
         /// Image size of the second camera.
         second: [u32; 2],
     },
-    /// Both cameras cover too little of the image in common.
+    /// The areas covered by both cameras overlap too little.
     #[error(
         "the region is too small, or the calibrations saw too little of the image in common: use {RegionImage}, or a larger region"
     )]
@@ -130,12 +134,13 @@ impl Default for Comparison {
     }
 }
 
-/// Prepares two calibrations for comparison. Calibrations with the same board share its errors, which then do not
-/// count; calibrations with different boards do not. `what` names the two in messages; `assume_target` compares them
-/// regardless of their boards.
+/// Prepares two calibrations for comparison. Calibrations with the same board share its errors, so
+/// these do not count. Calibrations with different boards share no errors. `what` names the two in
+/// messages; `assume_target` compares them regardless of their boards.
 ///
 /// # Errors
-/// Returns an error if their boards have the same tags at different sizes, so that at most one of them is right.
+/// Returns an error if their boards have the same tags at different sizes, because at most one of
+/// the sizes is right.
 pub fn compare_boards(
     what: [&str; 2],
     [first, second]: [&mut Estimate; 2],
@@ -159,7 +164,7 @@ pub fn compare_boards(
 }
 
 impl Comparison {
-    /// Compares two cameras by points at a distance, or at infinity.
+    /// Compares two cameras with points at a distance, or at infinity.
     ///
     /// # Errors
     /// Returns an error if the images differ in size, or no part of them is compared.
@@ -243,13 +248,15 @@ pub struct CameraMotion {
     pub rotation_rad: DVec3,
     /// Translation along its axes, mm.
     pub translation_mm: DVec3,
-    /// Probability of such a motion if nothing has moved; `None` if standard deviations are not known.
+    /// Probability of a motion at least this large if nothing has moved; `None` if standard
+    /// deviations are not known.
     pub p_value: Option<f64>,
 }
 
 impl CameraMotion {
-    /// Returns the motions of the cameras of a rig. They are relative to the first camera that is the rig frame in both
-    /// calibrations, else to the first camera; `pairs` are the same cameras in both.
+    /// Returns the motions of the cameras of a rig. They are relative to the first camera that
+    /// defines the rig frame in both calibrations, or to the first camera if there is none. `pairs`
+    /// are the same cameras in both.
     pub fn of_rig(pairs: &[(&CameraEstimate, &CameraEstimate)]) -> Vec<Self> {
         let is_rig = |(a, b): &&(&CameraEstimate, &CameraEstimate)| {
             [a, b].iter().all(|camera| camera.pose_sd.is_none())
@@ -267,7 +274,7 @@ impl CameraMotion {
             let known = deviations(a).zip(deviations(b)).filter(|_| is_frame);
             let off = rotation_rad.to_array().into_iter().chain(translation_mm.to_array());
             let p_value = known.map(|(a, b)| {
-                // Bonferroni bound for the largest of six, whatever their correlation.
+                // Bonferroni bound for the largest of six, for any correlation.
                 let largest = off.zip(a.iter().zip(b)).map(|(off, (a, b))| off.abs() / a.hypot(b));
                 let largest = largest.fold(0.0, f64::max);
                 (6.0 * libm::erfc(largest / std::f64::consts::SQRT_2)).min(1.0)
@@ -284,7 +291,7 @@ impl CameraMotion {
     }
 }
 
-/// Least number of compared positions: a motion has six unknowns.
+/// Minimum number of compared positions: a motion has six unknowns.
 const MIN_POSITIONS: usize = 6;
 
 /// A position in the image, and the point that the first camera sees there.
@@ -324,7 +331,7 @@ impl Grid {
         [at.x.floor() as i64, at.y.floor() as i64]
     }
 
-    /// Returns a test of which cells are compared.
+    /// Returns a predicate that is true for the cells that are compared.
     fn compared<'a>(
         &'a self,
         first: &CameraEstimate,
@@ -358,7 +365,8 @@ impl Grid {
     }
 }
 
-/// The motion after which the second camera projects points nearest to their pixels in the first.
+/// The motion that minimises the distance between the projections of points by the second camera
+/// and their pixels in the first.
 fn aligned(second: &CameraEstimate, positions: &[&Place], distance_mm: Option<f64>) -> Pose {
     let unknowns = unknowns(distance_mm);
     let mut motion = Pose::IDENTITY;
@@ -404,7 +412,7 @@ fn pseudo_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
 }
 
-/// Singular values below this are rounding, for a matrix with unit diagonal.
+/// Singular values below this are rounding errors, for a matrix with unit diagonal.
 const SINGULAR: f64 = 1e-12;
 
 /// The difference expected from the uncertainties of two cameras.
@@ -451,7 +459,7 @@ impl Known {
             right += of_motion.tr_mul(changes);
         }
         known.motions = -pseudo_inverse(&matrix)? * right;
-        // The differences over all places are G x with x of variance 1.
+        // The differences over all positions are G x, where x has variance 1.
         let (mut gram, mut square) = (DMatrix::zeros(count, count), 0.0);
         for (of_motion, changes, by) in &rows {
             let changes = changes + of_motion * &known.motions;
@@ -529,8 +537,8 @@ impl CameraEstimate {
     }
 }
 
-/// A square root of the covariance of a camera's parameters: the observed one without errors of the board, else that
-/// from noise.
+/// A square root of the covariance of a camera's parameters: the observed covariance without errors
+/// of the board, or the covariance from noise if there is none.
 fn half_of(camera: &CameraEstimate) -> Option<DMatrix<f64>> {
     let observed = camera.projection.as_ref().and_then(|known| known.observed.as_ref());
     let observed = observed.map(ObservedCovariance::without_board);

@@ -1,4 +1,4 @@
-//! The verdict whether two calibrations describe the same camera.
+//! The verdict on whether two calibrations describe the same camera.
 
 use super::comparison::{CameraMotion, Comparison};
 
@@ -9,11 +9,12 @@ const ROUNDING_PX: f64 = 1e-6;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Verdict {
-    /// No difference is significant and larger than the tolerance.
+    /// No difference is both significant and larger than the tolerance.
     Same,
     /// A camera, or its pose on the rig, differs significantly.
     Changed,
-    /// No judged difference is significant, but some cannot be judged because uncertainties are missing.
+    /// None of the tested differences is significant, but some cannot be tested because
+    /// uncertainties are missing.
     Undecided,
 }
 
@@ -91,7 +92,7 @@ mod tests {
         assert_eq!(of(&[&same, &open], 0.0), Verdict::Undecided);
         assert_eq!(of(&[&changed, &open], 0.0), Verdict::Changed);
         assert_eq!(of(&[&changed, &open], 0.2), Verdict::Same);
-        // One camera file given twice.
+        // The same camera file given twice.
         assert_eq!(of(&[&comparison(1e-10, None)], 0.0), Verdict::Same);
     }
 }

@@ -16,13 +16,14 @@ use crate::problem::shape::STRETCH;
 use crate::start::symmetry::LabelRotation;
 use deltille_core::camera::Camera;
 
-/// RMS residual beyond which a lens does not match its model, px: corners are located to a few hundredths of a pixel.
+/// RMS residual beyond which a lens does not match its model, px: corners are accurate to a few
+/// hundredths of a pixel.
 const POOR_RMS_PX: f64 = 1.0;
 
 /// Fraction of the views that a calibration may exclude.
 const MAX_EXCLUDED: f64 = 0.2;
 
-/// Least difference of the focal lengths of two minima, in standard deviations.
+/// Minimum difference between the focal lengths of two minima, in standard deviations.
 const APART_SIGMA: f64 = 10.0;
 const NEARLY: f64 = 1.5;
 
@@ -44,22 +45,23 @@ pub enum Diagnosis {
         /// RMS residual per axis without outliers, px.
         rms_px: f64,
     },
-    /// More than a fifth of the views (of a rig: of the frames) were excluded, so the result rests on the others only.
+    /// More than a fifth of the views (of the frames, for a rig) were excluded, so the result
+    /// depends only on the others.
     ManyExcluded {
         /// Number of excluded views or frames.
         excluded: usize,
         /// Number of all views or frames.
         all: usize,
     },
-    /// More than a fifth of the corners were excluded with their panels, in views whose other panels were kept, so the
-    /// result rests on the others only.
+    /// More than a fifth of the corners were excluded with their panels, in views whose other
+    /// panels were kept, so the result depends only on the others.
     ManyPanelsExcluded {
         /// Number of excluded corners.
         excluded: usize,
         /// Number of all corners.
         all: usize,
     },
-    /// Another camera of the same model fits the views as well or nearly as well.
+    /// Another set of parameters of the same model fits the views equally or almost equally well.
     SecondMinimum {
         /// The camera.
         camera: usize,
@@ -68,28 +70,30 @@ pub enum Diagnosis {
         /// RMS residual per axis of the other camera without outliers, px.
         rms_px: f64,
     },
-    /// A camera that lags behind the others by some frames; its frames were re-paired.
+    /// A camera that lags behind the others by some frames; its frames were matched again with
+    /// theirs.
     DelayedCamera {
         /// The camera.
         camera: usize,
         /// Lag in frames; negative if the camera leads.
         frames: i32,
     },
-    /// The board looks the same after a rotation, and the labels of a camera of a rig were rotated so that the cameras
-    /// agree on its pose, or both labellings fit.
+    /// The board looks the same after a rotation, and the labels of a camera in a rig were rotated
+    /// so that the cameras agree on the board's pose, or both labellings fit.
     LabelsRotated {
         /// The camera.
         camera: usize,
         /// The rotation, the number of frames, and whether it is certain.
         rotation: LabelRotation,
     },
-    /// The shape or the corners of a board were estimated, but it looks the same after a rotation, so views may show it
-    /// either way up.
+    /// The shape or the corners of a board were estimated, but the board looks the same after a
+    /// rotation, so views may show it in either orientation.
     AmbiguousLabels {
-        /// The smallest such rotation, degrees.
+        /// The smallest rotation after which it looks the same, degrees.
         degrees: u32,
     },
-    /// The camera changed between views: from some view on, its focal length or principal point differs.
+    /// The camera changed between views: its focal length or principal point differs after some
+    /// view.
     ChangedCamera {
         /// The camera.
         camera: usize,
@@ -119,14 +123,14 @@ pub enum Diagnosis {
     },
     /// Outliers have something in common.
     CommonOutliers(Finding),
-    /// Estimating a quantity that was taken as given explains the residuals.
+    /// Estimating a quantity that was assumed to be known explains the residuals.
     Remedied {
         /// The camera whose views show it.
         camera: usize,
         /// The quantity and its effect.
         remedy: Remedy,
     },
-    /// Residuals are not noise, and no tried alternative explains them.
+    /// Residuals are not noise, and none of the tested alternatives explains them.
     LackOfFit(LackOfFit),
     /// Residuals are large.
     PoorFit {
@@ -147,7 +151,7 @@ pub enum Diagnosis {
 }
 
 impl Diagnosis {
-    /// Whether the estimate must not be used as it is.
+    /// Whether the estimate must not be used.
     pub fn is_failure(&self) -> bool {
         matches!(
             self,
@@ -184,7 +188,8 @@ impl Diagnosis {
         }
     }
 
-    /// Whether this diagnosis explains the residuals of its camera at least as well as a remedy.
+    /// Whether this diagnosis explains the residuals of its camera at least as well as a remedy
+    /// does.
     fn explains(&self, (camera, remedy): &(usize, Remedy)) -> bool {
         let is_shape =
             matches!(self, Self::StretchedBoard { .. }) && remedy.alternative == Alternative::Shape;
@@ -195,8 +200,8 @@ impl Diagnosis {
 
 impl Calibration {
     /// Returns the diagnoses of [`Estimate::diagnose`] for an estimate from [`solve`](Self::solve) with their causes,
-    /// the most serious first. If residuals are not noise, alternatives are solved on a part of the views: other
-    /// models, the shape of the board, and the poses of panels.
+    /// the most serious first. If residuals are not noise, alternatives are calibrated on a part of
+    /// the views: other models, the shape of the board, and the poses of panels.
     pub fn explain(&self, found: &Estimate) -> Vec<Diagnosis> {
         // `solve` had split off the held-out frames.
         let own = self.split().map_or_else(|_| self.clone(), |(own, _)| own);
@@ -212,7 +217,8 @@ impl Calibration {
         said
     }
 
-    /// The diagnosis that the estimated shape or corners depend on which way up the board was seen.
+    /// The diagnosis that the estimated shape or corners depend on the orientation in which the
+    /// board was seen.
     fn open_labels(&self) -> Option<Diagnosis> {
         let is_of_place = self.board_shape || self.measure_target;
         let maps = self.symmetries.iter().flatten().filter(|_| is_of_place);
@@ -266,7 +272,7 @@ impl Calibration {
         others.min_by(|(_, one), (_, other)| one.total_cmp(other))
     }
 
-    /// The calibration of every camera on its own; `None` if it fails or is not needed.
+    /// The separate calibration of every camera; `None` if it fails or is not needed.
     fn each_alone(&self, found: &Estimate) -> Vec<Alone> {
         let is_good = is_explained(found);
         let alone = found.cameras.iter().enumerate().map(|(index, camera)| {
@@ -278,8 +284,8 @@ impl Calibration {
 }
 
 impl Estimate {
-    /// Returns the diagnoses that follow from the estimate itself, the most serious first; no other calibration is
-    /// solved. See [`Calibration::explain`].
+    /// Returns the diagnoses that follow from the estimate itself, the most serious first; no other
+    /// calibration is run. See [`Calibration::explain`].
     pub fn diagnose(&self) -> Vec<Diagnosis> {
         said(self, &vec![None; self.cameras.len()])
     }
@@ -376,7 +382,8 @@ fn many_excluded(found: &Estimate) -> Option<Diagnosis> {
     (is_sought && is_many).then_some(Diagnosis::ManyExcluded { excluded, all })
 }
 
-/// The diagnosis that too many corners were excluded with their panels, as when one of several boards has another size.
+/// The diagnosis that too many corners were excluded with their panels, for example because one of
+/// several boards has another size.
 fn many_panels_excluded(found: &Estimate) -> Option<Diagnosis> {
     let of_panels = found.excluded.iter().filter(|out| out.panel.is_some());
     let on_panels: usize = of_panels.map(|out| out.corners).sum();
@@ -388,7 +395,7 @@ fn many_panels_excluded(found: &Estimate) -> Option<Diagnosis> {
             (*seen, *out) = (*seen + 1, *out + usize::from(corner.outlier));
         }
         all += view.corners.len();
-        // A few corners may fit by chance.
+        // A few corners may fit by coincidence.
         let is_whole = |(seen, out): &&(usize, usize)| 10 * out >= 9 * seen;
         // With one panel only, the whole view would have been excluded.
         let several = of_panels.values().filter(|_| of_panels.len() > 1);
@@ -432,7 +439,7 @@ fn causes(found: &Estimate, alone: &[Alone], states: &mut Vec<Diagnosis>) -> Vec
     });
     let is_of_target = |misfit: &&LackOfFit| matches!(misfit, LackOfFit::Target { .. });
     let of_target: Vec<&LackOfFit> = found.lack_of_fit.iter().filter(is_of_target).collect();
-    // For displaced panels, their corners describe most of it.
+    // If panels are displaced, their corners account for most of the pattern.
     let panels = remedies.iter().any(of(Alternative::Panels)) && !of_target.is_empty();
     if panels {
         remedies.retain(|remedy| !of(Alternative::Panels)(remedy));
@@ -450,7 +457,7 @@ fn causes(found: &Estimate, alone: &[Alone], states: &mut Vec<Diagnosis>) -> Vec
             LackOfFit::Lens { camera: of, .. } => of == camera,
             LackOfFit::Target { rms_px, .. } => rms_px > 0.5 * poor_px,
         };
-        // For a single camera, any diagnosis names it.
+        // For a single camera, every diagnosis refers to it.
         let is_single = found.cameras.len() == 1 && !(misfits.is_empty() && remedies.is_empty());
         let is_of_state = |state: &Diagnosis| state.of_state().is_some_and(|(of, _)| of == camera);
         is_single

@@ -17,11 +17,10 @@ use deltille_core::setting::Setting::{
 };
 use deltille_core::words::{counted, p_value, places};
 
-/// Smallest rotation of a panel that the sentence mentions, degrees.
+/// Smallest rotation of a panel that a sentence mentions, degrees.
 const TURNED_DEG: f64 = 0.05;
 
-const GIVEN_CAMERA: &str =
-    "the given camera is the wrong one, or has changed since (lens, focus, zoom, crop)";
+const GIVEN_CAMERA: &str = "the camera file belongs to another camera, or the camera has changed since (lens, focus, zoom, crop)";
 
 /// Formats the diagnoses of an estimate as sentences, without initial capital and final full stop.
 #[derive(Clone, Copy, Debug)]
@@ -56,8 +55,8 @@ impl<'a> Messages<'a> {
             ),
             Diagnosis::ManyExcluded { excluded, all } => self.many_excluded(*excluded, *all),
             Diagnosis::ManyPanelsExcluded { excluded, all } => format!(
-                "{excluded} of {all} corners (more than a fifth) were excluded with their panels, so the result rests \
-                 on the others only; the size or the labels of a board differ from its description: measure an edge of \
+                "{excluded} of {all} corners (more than a fifth) were excluded with their panels, so the \
+                 result depends only on the others; the size or the labels of a board differ from its description: measure an edge of \
                  each board"
             ),
             Diagnosis::SecondMinimum { camera, other, rms_px } => self.second_minimum(*camera, other, *rms_px),
@@ -65,7 +64,7 @@ impl<'a> Messages<'a> {
             Diagnosis::LabelsRotated { camera, rotation } => self.labels_rotated(*camera, rotation),
             Diagnosis::AmbiguousLabels { degrees } => format!(
                 "the board has no tags and looks the same after a rotation by {degrees}°: its estimated corners or shape \
-                 are right only if it was the same way up in all views"
+                 are correct only if it had the same orientation in all views"
             ),
             Diagnosis::ChangedCamera { camera, change } => {
                 self.of_camera(*camera, changed(change))
@@ -98,8 +97,8 @@ impl<'a> Messages<'a> {
             _ => ("frames", "a camera moved, or images were not taken at the same time".to_owned()),
         };
         format!(
-            "{excluded} of {all} {what} (more than a fifth) were excluded, so the result rests on the others \
-             only: {lens}, or the labels of the excluded {what} are wrong"
+            "{excluded} of {all} {what} (more than a fifth) were excluded, so the result depends only on the \
+             others: {lens}, or the labels of the excluded {what} are wrong"
         )
     }
 
@@ -138,9 +137,9 @@ impl<'a> Messages<'a> {
         let found = &self.estimate.cameras[camera];
         let focal = |of: &Camera| of.focal_px.x;
         let text = format!(
-            "the model has a second minimum that fits the views nearly as well: fx {:.1} px leaves {rms_px:.4} px RMS, \
-             fx {:.1} px leaves {:.4} px; standard deviations describe one minimum only, and single parameters of the \
-             lens have no meaning on their own; use a model without a second minimum",
+            "the cost has a second minimum that fits the views almost equally well: fx {:.1} px leaves {rms_px:.4} px RMS, \
+             fx {:.1} px leaves {:.4} px; standard deviations describe one minimum only, and individual lens \
+             parameters are not meaningful on their own; use another model",
             focal(other),
             focal(&found.camera),
             found.inlier_rms_px()
@@ -179,8 +178,8 @@ impl<'a> Messages<'a> {
                         )
                     }
                     None => {
-                        "no pose of the panel explains them: wrong labels, a sheet that is not flat, or \
-                             another print"
+                        "no pose of the panel explains them: wrong labels, a sheet that is not flat, or a \
+                             different print"
                             .to_owned()
                     }
                 };
@@ -200,8 +199,8 @@ impl<'a> Messages<'a> {
                 let where_ =
                     format!("x {:.0} to {:.0}, y {:.0} to {:.0} px", from.x, to.x, from.y, to.y);
                 format!(
-                    "{}: {count}, in several views: the model does not fit the lens there, or something \
-                     is in front of it",
+                    "{}: {count}, in several views: the model does not fit the lens there, or an object \
+                     occludes the target",
                     of(camera, where_)
                 )
             }
@@ -254,8 +253,8 @@ impl<'a> Messages<'a> {
                 let (where_, cause) = match board {
                     Some(name) => (
                         format!("target {name}"),
-                        "the size or the labels of its board, or of that of another target, differ from the \
-                         description, or the board is not flat or not printed as stated: measure an edge of \
+                        "the size or the labels of its board or of another target's board differ from the \
+                         description, or the board is not flat, or its print does not match the description: measure an edge of \
                          each board"
                             .to_owned(),
                     ),
@@ -273,12 +272,14 @@ impl<'a> Messages<'a> {
     }
 
     fn moved_panels(&self, most: Option<PanelRef>) -> String {
-        let most = most.map_or(String::new(), |panel| format!(", most of all panel {panel}"));
+        let most = most.map_or(String::new(), |panel| format!(", especially panel {panel}"));
         if self.estimate.has_refined_panels() {
-            return format!("panels are not flat or not printed as stated{most}");
+            return format!(
+                "panels are not flat, or the print does not match the description{most}"
+            );
         }
         format!(
-            "panels are not where the target file places them{most}: {CalibrationRefinePanels} estimates \
+            "panels are displaced from their poses in the target file{most}: {CalibrationRefinePanels} estimates \
              their poses"
         )
     }
@@ -301,15 +302,15 @@ impl<'a> Messages<'a> {
                 "{scale}the board changed its shape between views: glue it to a flat surface, and {bars}"
             ),
             (Some(_), _) => format!(
-                "{scale}the board is bent in more ways than {CalibrationBoardShape} describes, or changed its \
+                "{scale}the shape of the board is more complex than {CalibrationBoardShape} describes, or changed its \
                  shape between views: {measuring}, glue the board to a flat surface, or {bars}"
             ),
             (None, Some(_)) => format!(
-                "{scale}the board is not flat or not printed as stated: try \
+                "{scale}the board is not flat, or the print does not match the description: try \
                  {CalibrationBoardShape}, {measuring}, or {bars}"
             ),
             (None, None) => format!(
-                "{scale}the board is not flat or not printed as stated, or the given camera is the wrong one: \
+                "{scale}the board is not flat, or the print does not match the description, or the camera file belongs to another camera: \
                  estimate the shape in a calibration with {CalibrationBoardShape} and pass it with \
                  {SightingBend}, or {bars}"
             ),
@@ -409,7 +410,7 @@ fn rolling_shutter(shutter: &RollingShutter, all: usize) -> String {
     format!(
         "rolling shutter: rows are displaced by {shear_px:.1} px between the first and the last, in {views} of {all} \
          views ({}; modelling it leaves {left_px:.3} px RMS), because the board or the camera moved during readout; \
-         hold both still for each image, or use a camera with a global shutter",
+         keep both still for each image, or use a camera with a global shutter",
         p_value(*significance)
     )
 }
@@ -440,8 +441,8 @@ fn ill_conditioned(parameters: &[String], sufficient: Option<Model>) -> String {
             .to_owned(),
     };
     format!(
-        "the views do not distinguish {} (ill-conditioned): their values have no meaning on their own; the \
-         camera is right where corners were seen, but may be wrong elsewhere; {advice}",
+        "the views do not distinguish {} (ill-conditioned): their individual values are not meaningful; \
+         projections are accurate where corners were detected, but may be wrong elsewhere; {advice}",
         parameters.join(", ")
     )
 }

@@ -1,8 +1,10 @@
 //! Diagnoses of an estimate.
 //!
-//! Input: an estimate, and its calibration for trials of alternatives. Output: diagnoses, and sentences.
+//! Input: an estimate, and its calibration, which is used to test alternatives. Output: diagnoses
+//! and their sentences.
 //!
-//! 1. `one_state` tests whether the views show one camera in one state, and the board as described.
+//! 1. `one_state` tests whether the camera had the same state in all views, and whether the board
+//!    matches its description.
 //! 2. `model_selection` tries alternatives that may explain a lack of fit, and smaller models that may suffice.
 //! 3. `diagnosis` collects the problems, their causes and remedies.
 //! 4. `messages` formats them as sentences.

@@ -1,8 +1,8 @@
-//! Model selection: which assumption of a calibration explains its lack of fit (lens model, flat
-//! board, panel poses, known camera), and which smaller lens model suffices.
+//! Model selection: finds the wrong assumption that explains the lack of fit of a calibration (lens
+//! model, flat board, panel poses, known camera), and a smaller lens model that suffices.
 //!
-//! Each alternative is fitted to a sample of the views and compared by an F test; an alternative
-//! has to be significant and large enough to matter.
+//! Each alternative is fitted to a sample of the views and compared by an F test. Its effect has to
+//! be significant and large enough to matter.
 
 use std::collections::BTreeSet;
 
@@ -17,16 +17,16 @@ use crate::problem::whitening::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
 use deltille_core::camera::{Camera, PROJECTION_PARAMETERS};
 use deltille_core::statistics::median;
 
-/// Fraction of the squares of the residuals from which the noise of detections explains them well enough: the rest does
-/// not matter, and no remedy is sought.
+/// Fraction of the squared residuals above which the noise of detections explains them well enough.
+/// The rest does not matter, and no remedy is tested.
 const EXPLAINED: f64 = 1.0 / (1.0 + MATTERS * MATTERS);
 
-/// A remedy counts as equal to the best from this fraction of its gain on: squares of a thousand
-/// corners are known to a few per cent.
+/// A remedy counts as equal to the best one if it reaches this fraction of its gain: the sum of
+/// squares of a thousand corners is known to a few per cent.
 const AS_GOOD: f64 = 0.9;
 
-/// Number of views in the sample, evenly over the sequence: a lack of fit that matters shows in so
-/// many, and a trial must not take longer than the calibration.
+/// Number of views in the sample, evenly spaced over the sequence. A lack of fit that matters is
+/// visible in this many views, and a test must not take longer than the calibration.
 const TRIAL_VIEWS: usize = 12;
 
 /// Largest residual of a given camera, as a fraction of the image width. Poses absorb most of the effect of a wrong
@@ -37,7 +37,7 @@ pub(super) const FOREIGN_PART: f64 = 0.005;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Remedy {
-    /// The quantity that was estimated instead of being taken as given.
+    /// The quantity that was estimated instead of being assumed.
     pub alternative: Alternative,
     /// RMS residual per axis without the remedy, outliers excluded, px.
     pub from_px: f64,
@@ -45,7 +45,7 @@ pub struct Remedy {
     pub to_px: f64,
 }
 
-/// The quantity to estimate instead of taking it as given.
+/// The quantity to estimate instead of assuming it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Alternative {
@@ -59,7 +59,7 @@ pub enum Alternative {
     Camera,
 }
 
-/// The calibration of one camera on its own, and its estimate.
+/// The separate calibration of one camera, and its estimate.
 pub(super) type Alone = Option<(Calibration, Estimate)>;
 
 impl Calibration {
@@ -74,7 +74,7 @@ impl Calibration {
         self.of_cameras(vec![CameraViews { intrinsics, ..self.cameras[0].clone() }])
     }
 
-    /// A sample of the views of a calibration of one camera, on which alternatives are tried, and
+    /// A sample of the views of a calibration of one camera, on which alternatives are tested, and
     /// its estimate.
     fn trial(&self, found: &Estimate) -> Option<(Self, Estimate)> {
         let views = &self.cameras[0].views;
@@ -86,9 +86,9 @@ impl Calibration {
         Some((sample, of_sample))
     }
 
-    /// The alternative that explains the residuals of a calibration of one camera better,
-    /// significantly and by an amount that matters; `None` where the noise of detections explains
-    /// them, or no alternative does.
+    /// The alternative that explains the residuals of a calibration of one camera significantly
+    /// better, and by an amount that matters. `None` if the noise of detections explains them, or
+    /// if no alternative does.
     pub(super) fn remedy(&self, found: &Estimate) -> Option<Remedy> {
         if is_explained(found) {
             return None;
@@ -106,7 +106,7 @@ impl Calibration {
             .richer()
             .iter()
             .map(|&model| (Alternative::Model(model), trial.of_intrinsics(model).adjusted().ok()));
-        // A board cannot be bent so far that nothing fits.
+        // Even a strongly bent board does not cause residuals this large.
         let bends = self.panels.len() == 1 && !self.board_shape && !is_absurd(&found.cameras[0]);
         let shape =
             bends.then(|| (Alternative::Shape, trial.clone().board_shape(true).adjusted().ok()));
@@ -119,8 +119,7 @@ impl Calibration {
         Some(Remedy { from_px, ..best })
     }
 
-    /// The same where the camera was given: whether the camera is another one, or the board is
-    /// bent.
+    /// The same if the camera was given: either it is another camera, or the board is bent.
     fn remedy_of_known(&self, camera: &Camera, found: &Estimate) -> Option<Remedy> {
         let values = camera.parameters().into_iter().enumerate();
         let of_lens = |(i, value): (usize, f64)| i < PROJECTION_PARAMETERS.len() || value != 0.0;
@@ -133,7 +132,7 @@ impl Calibration {
 
     /// The estimate with the poses of the panels as the views determine them.
     fn with_panels_found(&self) -> Option<Estimate> {
-        // Each view becomes a frame of its own, whatever its name.
+        // Each view becomes a separate frame, regardless of its name.
         let views = self.cameras[0].views.iter().enumerate();
         let views = views.map(|(index, view)| View { name: format!("{index:06}"), ..view.clone() });
         let panels = self.of_views(views.collect()).refine_panels(true).adjusted().ok()?.panels;
@@ -143,7 +142,8 @@ impl Calibration {
     }
 
     /// Indices of the given cameras of a rig that contradict their own images:
-    /// they are other cameras, or have changed since. Empty for a single camera.
+    /// they are other cameras, or have changed since they were calibrated. Empty for a single
+    /// camera.
     pub(crate) fn foreign_cameras(&self) -> Vec<usize> {
         let is_foreign = |&index: &usize| {
             let alone = self.alone(index, &self.panels);
@@ -157,7 +157,7 @@ impl Calibration {
         }
     }
 
-    /// The calibration of one camera on its own, with the panels as estimated, and its estimate.
+    /// The separate calibration of one camera, with the estimated panel poses, and its estimate.
     pub(super) fn and_alone(&self, camera: usize, found: &Estimate) -> Alone {
         if self.is_single() {
             return Some((self.clone(), found.clone()));
@@ -169,8 +169,8 @@ impl Calibration {
     }
 
     /// The smallest lens model, among those with a subset of the parameters, that fits camera
-    /// `camera` as well as the model of `found` by an F test; `None` when all parameters are
-    /// needed, or the intrinsics were given.
+    /// `camera` equally well as the model of `found`, according to an F test; `None` if all
+    /// parameters are needed, or the intrinsics were given.
     pub fn sufficient_model(&self, camera: usize, found: &Estimate) -> Option<Model> {
         let (alone, found) = self.and_alone(camera, found)?;
         alone.sufficient(&found)
@@ -218,9 +218,9 @@ fn best(found: &Estimate, tried: impl Iterator<Item = (Alternative, Estimate)>) 
     better.into_iter().find(|(gain, _)| *gain > AS_GOOD * most).map(|(_, remedy)| remedy)
 }
 
-/// The factor by which the mean square residual shrinks; `None` where that is not significant or
-/// does not matter. Outliers of the better fit count as a residual at the outlier limit in both, so
-/// that neither wild corners nor calling more corners wild is a gain.
+/// The factor by which the mean square residual shrinks; `None` if the reduction is not significant
+/// or does not matter. In both fits, outliers of the better fit count as residuals at the outlier
+/// limit. So neither outliers nor a larger number of outliers count as a gain.
 fn gain(found: &Estimate, other: &Estimate, alternative: Alternative) -> Option<f64> {
     let squares = |estimate: &Estimate| -> Vec<f64> {
         estimate.corners().map(|corner| corner.residual.length_squared()).collect()
@@ -263,7 +263,7 @@ fn fits_as_well(smaller: &Estimate, found: &Estimate) -> bool {
     }
     let (mut own, mut other, mut count) = (0.0, 0.0, 0.0);
     for (a, b) in found.corners().zip(smaller.corners()) {
-        // An outlier of the smaller model may be its lack of fit.
+        // An outlier of the smaller model may be due to its lack of fit.
         if !a.outlier {
             own += a.residual.length_squared();
             other += b.residual.length_squared();

@@ -1,4 +1,5 @@
-//! Tests whether the views show one camera in one state, and the board as described.
+//! Tests whether the camera had the same state in all views, and whether the board matches its
+//! description.
 //!
 //! ```text
 //!   change     views 1 … k | k + 1 … n     a focal length or principal point for each group; every k is tried
@@ -6,11 +7,12 @@
 //!   stretch    x and y of the board in another ratio than described
 //! ```
 //!
-//! Each is a score test on [`StateEquations`]. Standard deviations come from the scatter between views, so that errors
-//! of the model and of the board, which differ from view to view, do not look like a change. Stretch, shear and bend of
-//! the board are unknowns of each test: a bent board seen first from one side and later from the other is not a change
-//! of the camera. A change is also not reported if a drift, or the tilt and the distance of the board, explain it
-//! equally well: many sequences go from frontal to oblique views.
+//! Each is a score test on [`StateEquations`]. Standard deviations come from the scatter between
+//! views, so that errors of the model and of the board, which differ between views, are not
+//! mistaken for a change. Stretch, shear and bend of the board are unknowns of each test: a bent
+//! board seen first from one side and later from the other is not a change of the camera. A change
+//! is also not reported if a drift, or the tilt and the distance of the board, explain it equally
+//! well: many image sequences begin with frontal views and end with oblique ones.
 
 use crate::problem::whitening::OUTLIER_SIGMA;
 use crate::uncertainty::state_equations::{
@@ -19,28 +21,29 @@ use crate::uncertainty::state_equations::{
 use deltille_core::camera::Camera;
 use deltille_core::statistics::f_p_value;
 
-/// Significance level of each of the three diagnoses, 1 % for all; the level for a change covers all its positions
-/// together.
+/// Significance level of each of the three diagnoses, 1 % for all three; the level for a change
+/// covers all its positions together.
 const SIGNIFICANT: f64 = 0.01 / 3.0;
 
-/// Least number of views before and after a change: two, and one to test them.
+/// Minimum number of views before and after a change: two, and one more to test them.
 const MIN_VIEWS: usize = 3;
 
-/// Greatest fraction of the squares that displacements during readout may leave, so that the residual halves. Another
-/// lens model and a bent board leave most of their pattern in other directions.
+/// Maximum fraction of the squares that may remain after displacements during readout are modelled:
+/// the residual must halve. Another lens model and a bent board leave most of their pattern in
+/// other directions.
 const MAX_LEFT: f64 = 0.25;
 
-/// Least displacement at the edge of the image that counts as a change, in standard deviations of a corner: that of an
-/// outlier. Smaller changes, such as those of a lens that warms up, are covered by the uncertainties, see
-/// [`crate::uncertainty::halves`].
+/// Minimum displacement at the edge of the image that counts as a change, in standard deviations of
+/// a corner: the limit of an outlier. Smaller changes, such as those of a lens that warms up, are
+/// covered by the uncertainties, see [`crate::uncertainty::halves`].
 const MIN_CHANGE: f64 = OUTLIER_SIGMA;
 
-/// Least stretch that implies another board or a print scaled to its page: printers feed paper with errors of a few
-/// tenths of a per cent.
+/// Minimum stretch that implies another board or a print scaled to its page: printers feed paper
+/// with errors of a few tenths of a per cent.
 const MIN_STRETCH: f64 = 0.005;
 
-/// Limit of the sum of three squares beyond which a single view shows a displacement: exceeded once in a thousand
-/// views.
+/// Limit of the sum of three squares above which a single view shows a displacement. Noise exceeds
+/// it in one of a thousand views.
 const OF_VIEW: f64 = 16.27;
 
 /// The intrinsic that changed between views. Zoom and focus change the focal length; stabilised and shifted lenses move
@@ -99,7 +102,7 @@ pub struct CameraChange {
     pub value_px: [f64; 2],
     /// Standard deviation of their difference, px.
     pub sd_px: f64,
-    /// Probability that an unchanged camera shows such a difference at any view.
+    /// Probability that an unchanged camera shows a difference at least this large at any view.
     pub significance: f64,
     /// RMS residual per axis with the change modelled, px.
     pub left_px: f64,
@@ -112,7 +115,7 @@ impl CameraChange {
     }
 }
 
-/// Rows displaced relative to each other, as by a rolling shutter while the board moves.
+/// Rows displaced relative to each other, for example by a rolling shutter while the board moves.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct RollingShutter {
@@ -120,7 +123,7 @@ pub struct RollingShutter {
     pub shear_px: f64,
     /// Number of views that show it individually.
     pub views: usize,
-    /// Probability that noise makes residuals agree as well with such displacements.
+    /// Probability that noise alone makes residuals agree this well with displacements of rows.
     pub significance: f64,
     /// RMS residual per axis with the displacements modelled, px.
     pub left_px: f64,
@@ -135,7 +138,7 @@ pub struct BoardStretch {
     pub ratio: f64,
     /// Standard deviation of the ratio.
     pub sd: f64,
-    /// Probability that a board as described shows such a ratio.
+    /// Probability that a board that matches its description shows a ratio at least this extreme.
     pub significance: f64,
     /// RMS residual per axis with the stretch modelled, px.
     pub left_px: f64,
@@ -183,8 +186,8 @@ impl State {
                 left_px,
             })
         });
-        // One linear step leaves a part of a stretch, which may look like a shutter; shutters together may look like a
-        // stretch.
+        // One linear step leaves a part of a stretch, which may be mistaken for a rolling shutter.
+        // Several displacements by a shutter may be mistaken for a stretch.
         let shutter = shutter(equations, step.as_ref());
         let (stretch, shutter) = match (stretch, shutter) {
             (Some((stretch, true)), Some(_)) => (Some(stretch), None),

@@ -23,7 +23,8 @@ const LONGEST_ROW: usize = MAX_OF_LENS + 24 + shape::COUNT;
 /// Largest number of camera parameters that a corner depends on.
 const MAX_OF_LENS: usize = if MAX_PARAMETERS > MAX_TOUCHED { MAX_PARAMETERS } else { MAX_TOUCHED };
 
-/// The columns of a block seen by a spline, and the columns that each of its corners depends on.
+/// The columns of a block seen by a camera with a spline lens, and the columns that each of its
+/// corners depends on.
 struct Support {
     /// The column of each parameter of the lens; `None` if it is known.
     columns: Vec<Option<usize>>,
@@ -32,7 +33,7 @@ struct Support {
 }
 
 impl Support {
-    /// `None` for another lens, or if all its parameters are known.
+    /// `None` for lenses other than splines, or if all parameters are known.
     fn of(free: &[(usize, usize)], seen: &[Projection], parameters: usize) -> Option<Self> {
         seen.first()?.knots?;
         let mut columns = vec![None; parameters - PROJECTION_PARAMETERS.len()];
@@ -289,7 +290,8 @@ impl Local {
         &self.matrix[i * (i + 1) / 2..][..=i]
     }
 
-    /// Adds the two rows of a corner in some columns, ascending; returns the weight from the loss.
+    /// Adds the two rows of a corner in some columns, given in ascending order; returns the weight
+    /// from the loss.
     fn add_some(
         &mut self,
         places: &[usize],

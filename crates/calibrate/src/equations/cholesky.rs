@@ -1,7 +1,8 @@
 //! Factors, inverses and products of symmetric matrices by blocks of columns.
 //!
-//! nalgebra factors and inverts column by column, which reads a matrix larger than the caches from memory once
-//! for each column. By blocks, nearly all of the work is products of matrices, which read it once for each block.
+//! nalgebra factors and inverts column by column, which reads a matrix larger than the caches from
+//! memory once for each column. With blocks, nearly all work consists of matrix products, which
+//! read it once for each block.
 
 use nalgebra::{Cholesky, DMatrix, Dyn};
 
@@ -55,7 +56,8 @@ pub(super) fn inverse(factor: &Cholesky<f64, Dyn>) -> DMatrix<f64> {
     inverse
 }
 
-/// Subtracts the product of two matrices, which is symmetric, from the blocks of a matrix on and below its diagonal.
+/// Subtracts the product of two matrices, which must be symmetric, from the blocks on and below the
+/// diagonal of a matrix.
 pub(super) fn subtract_product(
     matrix: &mut DMatrix<f64>,
     left: &DMatrix<f64>,
@@ -82,7 +84,8 @@ pub(super) fn fill_upper_blocks(matrix: &mut DMatrix<f64>) {
 mod tests {
     use super::*;
 
-    /// Results equal those of nalgebra for one block, several blocks, and several blocks and a part.
+    /// Results equal those of nalgebra for one block, several blocks, and several blocks plus a
+    /// partial one.
     #[test]
     fn factors_and_inverses_equal_those_of_nalgebra() {
         for n in [0, 1, WIDTH, 3 * WIDTH, 3 * WIDTH + 7] {

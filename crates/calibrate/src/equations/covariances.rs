@@ -26,8 +26,8 @@ pub(crate) struct Covariances {
     pub tied: Vec<usize>,
 }
 
-/// A square root L of a covariance LLᵀ, and its inverse. Both come from the equations, so that well determined
-/// directions stay exact beside others.
+/// A square root L of a covariance LLᵀ, and its inverse. Both come directly from the equations, so
+/// that well determined directions remain exact next to poorly determined ones.
 pub(crate) struct Root {
     pub half: DMatrix<f64>,
     pub inverse: DMatrix<f64>,
@@ -41,7 +41,7 @@ struct Inverse {
     tied: Vec<usize>,
 }
 
-/// The blocks on the diagonal from a row on.
+/// The blocks on the diagonal, starting at a row.
 fn blocks<const K: usize>(matrix: &DMatrix<f64>, first: usize) -> Vec<SMatrix<f64, K, K>> {
     let block = |i: usize| matrix.fixed_view::<K, K>(i, i).into_owned();
     (first..matrix.nrows()).step_by(K).map(block).collect()
@@ -55,12 +55,14 @@ fn fixed<const K: usize>(matrix: &DMatrix<f64>) -> SMatrix<f64, K, K> {
 /// known poses: elimination leaves errors of a few dozen times the machine precision.
 const SINGULAR: f64 = 1e-14;
 
-/// Least component of an unknown that is involved in a direction, as a fraction of the largest component.
+/// Minimum component of an unknown that is involved in a direction, as a fraction of the largest
+/// component.
 const INVOLVED: f64 = 0.3;
 
-/// Inflation of the standard deviation from which a single parameter is not meaningful. Equally good values then form a
-/// valley a thousand times as long as wide; standard deviations assume a straight valley, but a bend by a thousandth of
-/// its length leads out of it. The terms of a short polynomial stay below.
+/// Inflation of the standard deviation above which a single parameter is not meaningful. Equally
+/// good values then form a valley that is a thousand times as long as it is wide. Standard
+/// deviations assume a straight valley, but a bend by a thousandth of its length leads out of it.
+/// The terms of a short polynomial remain below this limit.
 const TIED: f64 = 1000.0;
 
 impl Normal {
@@ -98,8 +100,9 @@ impl Normal {
         Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
     }
 
-    /// Solves the equations for right sides (columns) of the shared unknowns and the corner offsets, in this order,
-    /// which are zero for the poses of frames. `None` if a corner is undetermined.
+    /// Solves the equations for right-hand sides (columns) of the shared unknowns and the corner
+    /// offsets, in this order, which are zero for the poses of frames. `None` if a corner is
+    /// undetermined.
     pub(crate) fn solve_without_frames(
         &self,
         layout: &Layout,

@@ -30,7 +30,8 @@ impl OfFrame {
         Some(Self { locals, shared, pose: pose.cholesky()? })
     }
 
-    /// The right side for n unknowns. The pose is at its optimum, so its own right side is zero.
+    /// The right-hand side for n unknowns. The pose is at its optimum, so its own right-hand side
+    /// is zero.
     pub(crate) fn right(&self, n: usize) -> DVector<f64> {
         let mut right = DVector::zeros(n);
         for local in &self.locals {

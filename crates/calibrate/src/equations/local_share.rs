@@ -20,15 +20,16 @@ pub(crate) struct LocalShare {
     /// correlations.
     sd: DVector<f64>,
     root: Cholesky<f64, Dyn>,
-    /// Eigenvalues of Gᵀ H_tt G: the fraction of the information on a direction that the frame
+    /// Eigenvalues of Gᵀ H_tt G: the fraction of the information about a direction that the frame
     /// contributes.
     pub parts: DVector<f64>,
     directions: DMatrix<f64>,
 }
 
 impl LocalShare {
-    /// From a frame's H (`own`, n × n, non-zero only in rows and columns of unknowns that it
-    /// touches) and V (`covariance`, n × n). `None` where V is singular there.
+    /// Computes it from a frame's H (`own`, n × n, non-zero only in rows and columns of unknowns
+    /// that it touches) and V (`covariance`, n × n). `None` if V is singular in these rows and
+    /// columns.
     pub(crate) fn of(own: &DMatrix<f64>, covariance: &DMatrix<f64>) -> Option<Self> {
         let touched: Vec<usize> = (0..own.nrows()).filter(|&i| own[(i, i)] > 0.0).collect();
         let n = touched.len();

@@ -7,7 +7,7 @@ use crate::problem::bundle::Problem;
 use crate::problem::whitening::Whitening;
 use deltille_core::damping::Damping;
 
-/// Most accepted steps; problems with a minimum take ten to forty.
+/// Maximum number of accepted steps; problems with a minimum take ten to forty.
 const MAX_STEPS: usize = 200;
 
 /// Initial damping.
@@ -16,13 +16,16 @@ const DAMPING: f64 = 1e-4;
 /// Largest damping: beyond it no step lowers the cost.
 const MAX_DAMPING: f64 = 1e12;
 
-/// The accuracy at which the search ends. A step expected to lower the cost by δ² variances moves no unknown by more
-/// than δ of its standard deviations, however many corners there are; below that the search ends.
+/// The accuracy at which the search ends. A step that is expected to lower the cost by δ² variances
+/// moves no unknown by more than δ standard deviations, for any number of corners. The search ends
+/// below this.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Until {
-    /// Accurate enough to continue with more unknowns or other weights: the remainder is small compared with noise.
+    /// Accurate enough to continue with more unknowns or other weights: the remaining error is
+    /// small compared with the noise.
     Rough,
-    /// Accurate enough for results: three digits of the standard deviations, and more of the values.
+    /// Accurate enough for results: three digits of the standard deviations, and more digits of the
+    /// values.
     Fine,
 }
 
@@ -36,7 +39,7 @@ impl Until {
     }
 }
 
-/// The end of the search.
+/// The result of the search.
 pub(crate) struct Minimum {
     pub problem: Problem,
     pub normal: Normal,

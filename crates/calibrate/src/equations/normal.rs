@@ -7,8 +7,9 @@
 //!     (A − Σ B C⁻¹ Bᵀ) kept = a − Σ B C⁻¹ c,     part = C⁻¹ (c − Bᵀ kept)
 //! ```
 //!
-//! If corners of the target are unknown too, frames have unknowns in common only through corners, and corners only
-//! through frames. Of frames and corners, those with more unknowns are eliminated, and the others are kept.
+//! If the corners of the target are unknown, too, frames are coupled only through corners, and
+//! corners only through frames. Either frames or corners are eliminated, whichever have more
+//! unknowns.
 
 use std::ops::Range;
 
@@ -303,8 +304,8 @@ fn solve_scaled(matrix: DMatrix<f64>, right: DVector<f64>) -> Option<DVector<f64
     Some(solution.component_mul(&scale))
 }
 
-/// Number of corners whose equations are in memory at the same time, in whole blocks: enough for every thread, but
-/// little memory.
+/// Number of corners whose equations are in memory at the same time, rounded to whole blocks. It is
+/// enough work for every thread and needs little memory.
 const CORNERS_AT_A_TIME: usize = 100_000;
 
 #[cfg(test)]
@@ -333,8 +334,9 @@ mod tests {
         Map { frames: usize },
     }
 
-    /// Two cameras and two panels in three frames with noise, and every link unknown that may be; the same with a
-    /// target for each panel; or one camera and a panel that is bent, or whose corners are unknown.
+    /// Two cameras and two panels in three frames with noise, where every link is unknown that can
+    /// be unknown; the same with a target for each panel; or one camera and a panel that is bent,
+    /// or whose corners are unknown.
     fn problem(kind: Kind) -> Problem {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let count = if matches!(kind, Kind::Rig | Kind::Scene) { 2 } else { 1 };
@@ -471,7 +473,7 @@ mod tests {
             let frames = problem.frames.len();
             let count = layout.shared + 6 * frames + of_corners;
             let column = |i: usize| {
-                // About a ten-millionth of a pixel, whatever the unit.
+                // About a ten-millionth of a pixel, regardless of the unit.
                 let unit = DVector::from_fn(count, |j, _| f64::from(u8::from(i == j)));
                 let at = |by: f64| {
                     residuals(

@@ -113,7 +113,7 @@ impl Estimate {
     }
 }
 
-/// The poses of cameras, panels and targets that the views do not determine, in words.
+/// Descriptions of the poses of cameras, panels and targets that the views do not determine.
 fn open_poses(calibration: &Calibration, minimum: &Minimum, found: &Covariances) -> Vec<String> {
     let Minimum { problem, layout, .. } = minimum;
     let is_open = |first: Option<usize>| {
@@ -207,7 +207,7 @@ fn camera_estimate(
     let unknowns = &problem.cameras[index];
     let columns = &layout.parameters[index];
     let names = unknowns.camera.parameter_names();
-    // Single knots of a spline have no meaning on their own.
+    // Single knots of a spline have no meaning.
     let is_spline = unknowns.roughness.is_some();
     let is_loose = |&(i, column): &(usize, usize)| {
         found.loose.contains(&column)
@@ -241,7 +241,8 @@ fn camera_estimate(
     }
 }
 
-/// The projection uncertainty of a camera; the frames give the observed covariance of the shared unknowns.
+/// The projection uncertainty of a camera; the observed covariance of the shared unknowns comes
+/// from the frames.
 fn projection(
     camera: &CameraEstimate,
     state: &Option<StateEquations>,
@@ -272,14 +273,14 @@ fn projection(
     ProjectionUncertainty::of(problem, whitening, index, &free, distances_mm, observed)
 }
 
-/// Least sum of the weights of a corner's observations for a measured position: a view has two coordinates, a position
-/// three.
+/// Minimum sum of the weights of a corner's observations for a measured position: a view has two
+/// coordinates, and a position has three.
 const MIN_VIEWS: f64 = 2.0;
 
-/// Least mean weight of these observations: a majority.
+/// Minimum mean weight of these observations: a majority must count.
 const MIN_WEIGHT: f64 = 0.5;
 
-/// Whether a position rests on too few effective observations.
+/// Whether a position depends on too few effective observations.
 fn rests_on_few(&(weight, count): &(f64, usize)) -> bool {
     weight < MIN_VIEWS || weight < MIN_WEIGHT * count as f64
 }

@@ -1,4 +1,5 @@
-//! Numbers of corners in the parts of an image, kept when the corners themselves are not listed.
+//! Numbers of corners in the parts of an image, for estimates that do not list the corners
+//! themselves.
 
 use glam::DVec2;
 
@@ -14,7 +15,8 @@ pub struct Coverage {
 }
 
 impl Coverage {
-    /// Creates a coverage from counts, row by row from the top; `None` if there is not one count for each cell.
+    /// Creates a coverage from counts, row by row from the top; `None` unless there is exactly one
+    /// count for each cell.
     pub fn new(columns: usize, rows: usize, counts: Vec<u32>) -> Option<Self> {
         let is_whole = columns.checked_mul(rows) == Some(counts.len());
         is_whole.then_some(Self { columns, rows, counts })

@@ -15,18 +15,18 @@ pub struct ImageCircle {
     pub radius_px: f64,
 }
 
-/// Number of directions from the centre in which the outermost corners are compared; several lie between a side of the
-/// image and its corner.
+/// Number of directions from the centre in which the outermost corners are compared; several of
+/// them lie between a side of the image and its corner.
 const DIRECTIONS: usize = 16;
 
-/// Fraction of the radius from which corners count as on the rim of the circle: boards reach the rim with their last
-/// row of corners, not with their paper.
+/// Fraction of the radius beyond which corners count as being on the rim of the circle. It is less
+/// than 1 because the paper of a board extends beyond its last row of corners.
 const RIM: f64 = 0.85;
 
 impl ImageCircle {
     /// Finds the image circle of a camera from the detected corners; `None` if the lens covers the whole image, as
-    /// perspective lenses do. There is a circle if the corners fill one, or if the lens does not image the corners of
-    /// the image.
+    /// perspective lenses do. There is a circle if the detected corners fill one, or if the lens
+    /// model does not reach the corners of the image.
     pub fn of(camera: &Camera, seen: &[DVec2]) -> Option<Self> {
         if camera.lens.is_perspective() {
             return None;
@@ -68,8 +68,8 @@ impl ImageCircle {
     }
 }
 
-/// Radius from the principal point up to which the lens sees towards a corner of the image; `None` if it sees the
-/// corner.
+/// Radius from the principal point, in the direction of a corner of the image, up to which the lens
+/// model is valid; `None` if it is valid up to the corner.
 fn seen_towards(camera: &Camera, corner: DVec2) -> Option<f64> {
     let centre = camera.centre_px;
     let at = |part: f64| centre + part * (corner - centre);
@@ -77,7 +77,7 @@ fn seen_towards(camera: &Camera, corner: DVec2) -> Option<f64> {
         return None;
     }
     let (mut low, mut high) = (0.0, 1.0);
-    // To a fraction of a pixel.
+    // Bisects to a fraction of a pixel.
     for _ in 0..20 {
         let middle = 0.5 * (low + high);
         *(if camera.unproject(at(middle)).is_some() { &mut low } else { &mut high }) = middle;
@@ -105,7 +105,8 @@ mod tests {
         let lens = fisheye(-0.01);
         let filled = ImageCircle::of(&lens, &disc(&lens, 590.0)).unwrap();
         assert!((filled.radius_px - 600.0).abs() < 1.0, "{filled:?}");
-        // Neither a small disc nor corners in the corners of the image imply a circle.
+        // A small disc does not imply a circle. Detected corners in the corners of the image do not
+        // imply one, either.
         assert_eq!(ImageCircle::of(&lens, &disc(&lens, 300.0)), None);
         let mut all = disc(&lens, 590.0);
         all.extend([DVec2::new(20.0, 20.0), DVec2::new(1580.0, 1180.0)]);

@@ -7,8 +7,8 @@ use glam::DVec2;
 use super::image_circle::ImageCircle;
 use deltille_core::camera::Camera;
 
-/// A lens model that folds back or has a pole within the image, as polynomials and rational functions do
-/// where no corner constrains them.
+/// A lens model that folds back or has a pole within the image, which polynomials and rational
+/// functions do where no corner constrains them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct LensLimit {

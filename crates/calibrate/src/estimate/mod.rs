@@ -3,8 +3,8 @@
 //! Input: the settled adjustment. Output: a [`values::Estimate`].
 //!
 //! 1. `values` are cameras, targets, frames, views and corners with residuals.
-//! 2. `target_map` (measured corners), `coverage` (where corners were seen), `lens_limit` and `image_circle` (extent of
-//!    the lens) are parts of it.
+//! 2. `target_map` (measured corners), `coverage` (areas with corners), and `lens_limit` and
+//!    `image_circle` (extent of the lens) are parts of it.
 //! 3. `uncertainty_map` is the projection uncertainty of a camera over its image.
 //! 4. `assemble` builds the estimate.
 

@@ -11,9 +11,10 @@ use deltille_core::targets::{MeasuredPosition, Target};
 
 /// The positions of the corners of a target as measured by the views.
 ///
-/// Offsets are relative to the best-fitting plan: the poses of the views absorb a translation and rotation of all
-/// corners, and the distances a common scale, so the offsets do not contain these. If panel poses are estimated too,
-/// the offsets do not contain a translation and rotation of each panel either.
+/// Offsets are relative to the best-fitting plan. They contain no translation or rotation of all
+/// corners, because the poses of the views absorb these, and no common scale, because the distances
+/// absorb it. If panel poses are also estimated, the offsets contain no translation or rotation of
+/// each panel either.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TargetMap {
     /// Ordered by panel, row and column.
@@ -21,8 +22,8 @@ pub struct TargetMap {
     /// The estimated standard deviation of the offsets in the plane of the panels and out of it, mm. Corners seen in
     /// few views are shrunk towards zero accordingly.
     pub expected_mm: [f64; 2],
-    /// Number of detected corners that are not in the map because their positions would rest on outliers: fewer than
-    /// two observations count, or less than half of them.
+    /// Number of detected corners that are not in the map because their positions would depend on
+    /// outliers: fewer than two of their observations are inliers, or fewer than half.
     pub few: usize,
 }
 
@@ -45,8 +46,8 @@ pub struct CornerOffset {
     pub views: usize,
 }
 
-/// Least number of views of a corner for measuring to pay: the remaining noise of its position is then a third of that
-/// of a single view, less than the half at which a pattern matters.
+/// Minimum number of views of a corner that makes measuring worthwhile: the remaining noise of its
+/// position is then a third of that of a single view. A pattern matters at half of that noise.
 pub const MIN_VIEWS_TO_MEASURE: usize = 8;
 
 /// Probability that any corner of a perfect target is reported as off.
@@ -64,10 +65,11 @@ impl TargetMap {
         &self.corners
     }
 
-    /// Returns the target with its corners at the measured positions. It keeps its name, by which its prints are known.
+    /// Returns the target with its corners at the measured positions. It keeps its name, because
+    /// prints are identified by it.
     ///
-    /// Offsets lead from the plan to the measured positions, so they include earlier corrections such as a previous
-    /// measurement or a print scale.
+    /// Offsets are relative to the planned positions, so they include earlier corrections, for
+    /// example a previous measurement or a print scale.
     pub fn on(&self, target: &Target) -> Target {
         let mut measured = target.clone();
         measured.plan = Some(target.printed());
@@ -135,7 +137,7 @@ impl CornerOffset {
         (self.panel, self.row, self.col)
     }
 
-    /// Probability of such an offset for a corner at its planned position.
+    /// Probability of an offset at least this large for a corner at its planned position.
     pub fn p_value(&self) -> f64 {
         let covariance = nalgebra::Matrix3::from_fn(|i, j| self.covariance_mm2[i][j]);
         let offset = nalgebra::Vector3::from(self.offset_mm.to_array());
@@ -145,7 +147,7 @@ impl CornerOffset {
 }
 
 impl Sighting {
-    /// Moves the corners to the positions of a map; corners that are not in the map stay.
+    /// Moves the corners to the positions of a map; corners that are not in the map do not move.
     pub fn correct(&mut self, map: &TargetMap) {
         for seen in &mut self.observations {
             seen.panel_mm += map.offset_mm(self.panel, seen.row, seen.col);

@@ -18,14 +18,16 @@ pub struct UncertaintyMap {
     pub columns: usize,
     /// Number of rows.
     pub rows: usize,
-    /// Standard deviation of a projection along the worst direction, px, row by row; `None` beyond the lens.
+    /// Standard deviation of a projection along the worst direction, px, row by row; `None` beyond
+    /// the field of view of the lens.
     pub sd_px: Vec<Option<f64>>,
 }
 
 /// Number of positions along the longer side of an image.
 const POSITIONS: usize = 24;
 
-/// Number of corners that suffices for the mean uncertainty over the seen part of the image.
+/// Number of corners that suffices for the mean uncertainty over the part of the image with
+/// corners.
 const ENOUGH_CORNERS: usize = 1000;
 
 impl CameraEstimate {
@@ -37,8 +39,8 @@ impl CameraEstimate {
         }
     }
 
-    /// Covariance of the projection of the point seen at a pixel, px²; `None` beyond the lens, or if it is not known.
-    /// The point is at a distance in mm, or at infinity.
+    /// Covariance of the projection of the point seen at a pixel, px²; `None` beyond the field of
+    /// view of the lens, or if it is not known. The point is at a distance in mm, or at infinity.
     pub fn projection_covariance(
         &self,
         pixel: DVec2,
@@ -79,8 +81,8 @@ impl CameraEstimate {
     }
 
     /// The uncertainty maps at infinity and at the distances of
-    /// [`ProjectionUncertainty::distances_mm`](crate::ProjectionUncertainty::distances_mm), from noise and observed, as
-    /// far as these are known.
+    /// [`ProjectionUncertainty::distances_mm`](crate::ProjectionUncertainty::distances_mm), from
+    /// noise and observed, if these are known.
     pub fn uncertainty_maps(&self) -> Vec<UncertaintyMap> {
         let distances = self.projection.iter().flat_map(|known| &known.distances_mm);
         let distances = std::iter::once(None).chain(distances.map(|&mm| Some(mm)));

@@ -26,7 +26,8 @@ use deltille_core::targets::{Name, PanelPose, Target, TargetIdentity};
 
 /// The result of a calibration: cameras, their poses and those of the target, with uncertainties.
 ///
-/// One camera is a rig of one: the rig frame is that of the camera, and a frame a view.
+/// A single camera is a rig with one camera: the rig frame is the camera frame, and each frame is a
+/// view.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Estimate {
@@ -63,7 +64,8 @@ pub struct Estimate {
     pub held_out: Option<Box<Estimate>>,
     /// Number of iterations of the last bundle adjustment.
     pub steps: usize,
-    /// The information on the first camera and the board's shape, from which views are proposed.
+    /// The information about the first camera and the board's shape, on which proposals of views
+    /// are based.
     pub(crate) known: Option<KnownSoFar>,
     /// The state equations of the views of each camera.
     pub(crate) states: Vec<Option<StateEquations>>,
@@ -85,14 +87,15 @@ pub struct CameraEstimate {
     pub covariance: Matrix,
     /// The projection uncertainty; `None` if the camera was given, or if its motion is undetermined.
     pub projection: Option<ProjectionUncertainty>,
-    /// Names of ill-conditioned parameters. Either a joint change of them moves no corner; then their standard
-    /// deviations are lower bounds. Or it moves corners hardly at all; then neither the value nor the standard
-    /// deviation of a single parameter is meaningful.
+    /// Names of ill-conditioned parameters. If a joint change of them moves no corner, their
+    /// standard deviations are lower bounds. If it moves corners only slightly, neither the value
+    /// nor the standard deviation of a single parameter is meaningful.
     pub ill_conditioned: Vec<String>,
     /// Pose on the rig: from the rig frame to the camera frame, mm.
     pub camera_from_rig: Pose,
-    /// Standard deviations of that pose: rotation (rad) and translation (mm) about the camera's axes; `None` if it was
-    /// not estimated, as for the first camera, which is the rig frame.
+    /// Standard deviations of that pose: rotation (rad) and translation (mm) about the camera's
+    /// axes; `None` if it was not estimated. This is the case for the first camera, which defines
+    /// the rig frame.
     pub pose_sd: Option<[f64; 6]>,
     /// Observed standard deviations of that pose, from the scatter between frames; `None` if it was not estimated, or
     /// with too few frames.
@@ -101,11 +104,13 @@ pub struct CameraEstimate {
     /// frames earlier.
     pub delay: i32,
     /// The rotation of its labels that makes the cameras of a rig agree, for a board that looks the same after a
-    /// rotation. `None` if there is no such board, or the detected labels agree and are decisive.
+    /// rotation. `None` if there is no board like this, or if the detected labels agree and are
+    /// unambiguous.
     pub label_rotation: Option<LabelRotation>,
     /// The used views, in the order of the frames.
     pub views: Vec<ViewEstimate>,
-    /// Where corners were seen, for a camera whose views do not list them, such as one read from a file.
+    /// The areas where corners were seen, for a camera whose views do not list corners, for example
+    /// a camera that was read from a file.
     pub coverage: Option<Coverage>,
     /// RMS reprojection error per axis over all its views, px.
     pub rms_px: f64,
@@ -122,12 +127,12 @@ pub struct TargetEstimate {
     pub panels: Range<usize>,
     /// Pose relative to the first target.
     pub scene_from_target: Pose,
-    /// Standard deviations of that pose: rotation (rad) and translation (mm) along the first target's axes; `None` if
-    /// it was not estimated, as for the first target.
+    /// Standard deviations of that pose: rotation (rad) and translation (mm) along the first
+    /// target's axes; `None` if it was not estimated, for example for the first target.
     pub pose_sd: Option<[f64; 6]>,
 }
 
-/// A time at which the cameras took images, and the pose of the target then.
+/// A time at which the cameras took images, and the pose of the target at that time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameEstimate {
     /// Name of the frame: that of its views.
@@ -229,7 +234,8 @@ impl Estimate {
         of_panel.filter(|_| self.targets.len() > 1).map(|target| target.name.as_str())
     }
 
-    /// The estimate of one of several targets and its observations, as if it were the only one.
+    /// The estimate reduced to one of several targets and its observations, as if it were the only
+    /// target.
     #[must_use]
     pub fn of_target(&self, target: usize) -> Self {
         let Some(of) = self.targets.get(target) else { return self.clone() };
@@ -306,7 +312,8 @@ impl CameraEstimate {
         }
     }
 
-    /// Removes all uncertainties of a failed calibration: they follow from residuals that the model does not explain.
+    /// Removes all uncertainties of a failed calibration, because they come from residuals that the
+    /// model does not explain.
     pub fn forget_uncertainties(&mut self) {
         self.covariance = Matrix::empty();
         (self.projection, self.pose_sd, self.observed_pose_sd) = (None, None, None);
@@ -356,7 +363,8 @@ impl CameraEstimate {
 }
 
 impl Coverage {
-    /// The corners of a camera's views, or the stored coverage if the views do not list them.
+    /// The coverage from the corners of a camera's views, or the stored coverage if the views do
+    /// not list corners.
     pub fn of(camera: &CameraEstimate) -> Self {
         match &camera.coverage {
             Some(known) if camera.corners().next().is_none() => known.clone(),

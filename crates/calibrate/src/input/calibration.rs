@@ -1,4 +1,4 @@
-//! The input of a calibration: cameras with their views, a target, and what is known of them.
+//! The input of a calibration: cameras with their views, a target, and prior knowledge of both.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -21,10 +21,11 @@ use deltille_core::targets::{Target, TargetIdentity};
 /// A calibration of cameras that are fixed to each other, from their views of one rigid target, or of several targets
 /// that are fixed to each other.
 ///
-/// A single camera is a rig of one. [`solve`](Self::solve) estimates everything that is not given: the intrinsics of
-/// the cameras, without a first guess, their relative poses, and the pose of the target in each frame. On request it
-/// also estimates the poses of the panels on the target and the shape of the board. With several targets, see
-/// [`of_targets`](Self::of_targets), it also estimates the poses of the targets relative to each other.
+/// A single camera is a rig with one camera. [`solve`](Self::solve) estimates everything that is
+/// not given: the intrinsics of the cameras, without a first guess, their relative poses, and the
+/// pose of the target in each frame. On request it also estimates the poses of the panels on the
+/// target and the shape of the board. With several targets, see [`of_targets`](Self::of_targets),
+/// it also estimates the poses of the targets relative to each other.
 ///
 /// ```
 /// # use deltille_calibrate::{Calibration, CalibrationError, Estimate, Model, PanelPrior, View};
@@ -49,11 +50,12 @@ pub struct Calibration {
     pub(crate) refine_panels: bool,
     pub(crate) board_shape: bool,
     pub(crate) measure_target: bool,
-    /// Standard deviation of a corner of the board from its plan, mm; `None` for that of an ordinary print.
+    /// Standard deviation of a corner of the board from its planned position, mm; `None` for the
+    /// standard deviation of an ordinary print.
     pub(crate) board_accuracy_mm: Option<f64>,
     pub(crate) hold_out: Option<usize>,
     pub(crate) distances_mm: Vec<f64>,
-    /// Index of the model's start to use; `None` for the best.
+    /// Index of the initial lens of the model to use; `None` to use the best one.
     pub(crate) start: Option<usize>,
     /// Names of all frames in order, if this calibration contains only some of them.
     pub(crate) order: Vec<String>,
@@ -75,7 +77,7 @@ pub(crate) struct TargetPanels {
     pub scene_from_target: Option<Pose>,
 }
 
-/// The views of one camera, and what is known of the camera.
+/// The views of one camera, and prior knowledge of the camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraViews {
     /// Name of the camera in results and messages.
@@ -155,8 +157,9 @@ impl Calibration {
     /// poses. [`PanelRef::index`](crate::PanelRef::index) counts the panels of all targets, one target after the other.
     /// The frame of the first target is the scene frame.
     ///
-    /// Two cameras need not see the same target. If each sees a target of its own, the motion of the rig determines the
-    /// poses of the cameras and the targets; the rig must rotate about two axes.
+    /// Two cameras need not see the same target. If each camera sees a different target, the motion
+    /// of the rig determines the poses of the cameras and the targets. The rig must rotate about
+    /// two axes.
     pub fn of_targets(targets: impl IntoIterator<Item = (String, Vec<PanelPrior>)>) -> Self {
         let (mut panels, mut of_targets) = (Vec::new(), Vec::new());
         for (name, of_target) in targets {
@@ -190,7 +193,7 @@ impl Calibration {
     /// other.
     pub fn of(reference: &Reference, panels: Vec<PanelPrior>) -> Self {
         let targets = reference.targets();
-        // The least accurate of several targets counts.
+        // Uses the accuracy of the least accurate target.
         let accuracy_mm = targets.iter().map(Target::measured_sd_mm);
         let accuracy_mm = accuracy_mm.reduce(|one, other| Some(one?.max(other?))).flatten();
         let symmetries = reference.label_symmetries();
@@ -219,7 +222,7 @@ impl Calibration {
         self
     }
 
-    /// Replaces the intrinsics of a camera by its index.
+    /// Replaces the intrinsics of the camera with this index.
     pub fn set_intrinsics(&mut self, camera: usize, intrinsics: impl Into<Intrinsics>) {
         self.cameras[camera].intrinsics = intrinsics.into();
     }
@@ -236,8 +239,9 @@ impl Calibration {
         Self { weights, ..self }
     }
 
-    /// Sets whether the poses of the panels on the target are estimated. One panel stays fixed: the one seen most often
-    /// among those that were never measured. An earlier measurement of the other panels counts as an observation.
+    /// Sets whether the poses of the panels on the target are estimated. One panel remains fixed:
+    /// of the panels that were never measured, the one that was seen most often. Earlier
+    /// measurements of the other panels count as observations.
     #[must_use]
     pub fn refine_panels(self, refine_panels: bool) -> Self {
         Self { refine_panels, ..self }
@@ -320,7 +324,7 @@ impl Calibration {
         self.panels.iter().map(|panel| panel.target_from_panel).collect()
     }
 
-    /// Whether it has one camera and a target that is taken as described.
+    /// Whether it has one camera and a target that is assumed to match its description.
     pub(crate) fn is_single(&self) -> bool {
         self.cameras.len() == 1 && self.targets.len() == 1 && !self.refine_panels
     }
@@ -346,8 +350,8 @@ impl Calibration {
         }
     }
 
-    /// The calibration of one camera on its own, with these panel poses. Each target in an image becomes a view of its
-    /// own.
+    /// The calibration of a single camera, with these panel poses. Each target in an image becomes
+    /// a separate view.
     pub(crate) fn alone(&self, camera: usize, panels: &[PanelPrior]) -> Self {
         let mut camera = self.cameras[camera].clone();
         if self.targets.len() > 1 {

@@ -13,7 +13,7 @@ use deltille_core::targets::{
     BoardSpec, Target, TargetError, TargetIdentity, TargetSpec, board_vertices, symmetries,
 };
 
-/// Advice for detections of another target.
+/// Advice for a detection of another target.
 pub(super) fn assume_target() -> String {
     format!(
         "give the description that was used for detection, or set {DetectionAssumeTargets} to use this one"
@@ -68,7 +68,7 @@ impl UntaggedGrid {
         }
     }
 
-    /// Checks whether a detected grid can be this board; the error says why not.
+    /// Checks whether a detected grid can be this board. The error states the reason if it cannot.
     pub(crate) fn check(&self, grid: &Grid) -> Result<(), String> {
         let Some([rows, cols]) = self.size else { return Ok(()) };
         let found = grid.corners.len();
@@ -86,9 +86,7 @@ impl UntaggedGrid {
             return Ok(());
         }
         Err(if labels == self.labels(cols, rows) {
-            format!(
-                "it has {cols} rows × {rows} columns: exchange the values of {UntaggedGridSize}"
-            )
+            format!("it has {cols} rows × {rows} columns: swap the values of {UntaggedGridSize}")
         } else {
             format!("its rows and columns do not match a board of {rows} × {cols} corners")
         })

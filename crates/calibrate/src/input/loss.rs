@@ -1,7 +1,7 @@
 //! Robust losses for residuals.
 
-/// Largest residual that counts in full, in standard deviations. Of normally distributed corners 1.1 % lie beyond it,
-/// so data without outliers lose little.
+/// Largest residual that counts in full, in standard deviations. It is exceeded by 1.1 % of
+/// normally distributed corners, so data without outliers lose little information.
 const SCALE_SIGMA: f64 = 3.0;
 
 /// The loss of a corner as a function of its distance e from its prediction, in standard deviations.

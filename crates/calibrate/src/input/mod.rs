@@ -1,14 +1,15 @@
 //! The input of a calibration: named detections become views.
 //!
-//! Input: detections and the photographed target. Output: a [`calibration::Calibration`] with everything that is known
-//! and everything that is requested.
+//! Input: detections and the photographed target. Output: a [`calibration::Calibration`] with all
+//! prior knowledge and all requests.
 //!
 //! 1. `reference` describes one target, several targets, or an untagged board (`grid`), and checks labels against it.
 //! 2. `views` converts all detections and checks them for image sizes, duplicates, wrong labels and mirrored images.
 //! 3. `observation` is the content of an image: corners of panels (`panel`).
-//! 4. `calibration` collects cameras with their views and the settings, among them `loss` and `weights`.
+//! 4. `calibration` collects cameras with their views and the settings, including `loss` and
+//!    `weights`.
 //!
-//! `order` sorts the names of frames by their numbers, `sample` selects some of many items.
+//! `order` sorts the names of frames by their numbers, and `sample` selects evenly spaced items.
 
 pub(crate) mod calibration;
 pub(crate) mod grid;

@@ -5,7 +5,7 @@ use glam::{DQuat, DVec2, DVec3};
 use super::panel::PanelRef;
 use crate::excluded::{Excluded, Reason};
 
-/// Least number of corners of a panel in a view; with fewer, wrong corners cannot be recognised.
+/// Minimum number of corners of a panel in a view; with fewer, outliers cannot be identified.
 pub(crate) const MIN_CORNERS: usize = 6;
 
 /// A corner of a panel that a camera detected.
@@ -26,8 +26,8 @@ pub struct Observation {
 /// The corners of one rigid target in one image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
-    /// Name of the view, for example that of the detection file; views of several cameras with the same name belong to
-    /// one frame.
+    /// Name of the view, for example the name of the detection file; views of several cameras with
+    /// the same name belong to one frame.
     pub name: String,
     /// File name of the image.
     pub image: String,

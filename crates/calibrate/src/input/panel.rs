@@ -9,8 +9,8 @@ use deltille_core::targets::PanelPose;
 
 /// A reference to one of the photographed panels.
 ///
-/// The index finds everything that is stored per panel; the id stands in the target file and on the print. Only the id
-/// is shown and written, and only the index is used for lookup.
+/// The index is the key of all data that are stored per panel. The id is in the target file and on
+/// the print. Only the id is displayed and written, and only the index is used for lookup.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct PanelRef {
     index: usize,
@@ -54,8 +54,8 @@ impl Serialize for PanelRef {
 pub struct PanelPrior {
     /// The pose, from the panel frame to the target frame, mm.
     pub target_from_panel: Pose,
-    /// Covariance of rotation (rad) and translation (mm) along the axes of the target, if the pose was measured; `None`
-    /// if it is as stated.
+    /// Covariance of rotation (rad) and translation (mm) along the axes of the target, if the pose
+    /// was measured; `None` if the pose is exactly as stated.
     pub covariance: Option<[[f64; 6]; 6]>,
 }
 

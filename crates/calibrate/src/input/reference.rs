@@ -21,7 +21,7 @@ fn other_kind() -> String {
 }
 
 /// Conclusion from labels that are not on the target.
-const OTHER_TARGET: &str = "; the detection is of another target";
+const OTHER_TARGET: &str = "; the detection shows another target";
 
 /// Message for a detection that was made with one of several targets.
 const OF_ONE_TARGET: &str =
@@ -65,8 +65,8 @@ impl Reference<'_> {
         }
     }
 
-    /// The ambiguity left by a rotation that looks the same in an image, as a sentence without initial capital and full
-    /// stop; `None` if the labels are unambiguous.
+    /// The ambiguity due to a rotation that looks the same in an image, as a sentence without
+    /// initial capital and full stop; `None` if the labels are unambiguous.
     pub fn label_ambiguity(&self) -> Option<String> {
         let maps = self.label_symmetries();
         let of_most = maps.iter().max_by_key(|maps| maps.len()).filter(|maps| !maps.is_empty())?;
@@ -211,8 +211,9 @@ impl Reference<'_> {
         }
     }
 
-    /// Returns the index of the target that a grid belongs to. The identity of the target that was used for labelling
-    /// decides if the detection has it, otherwise the name. `None` if the grid belongs to none of these targets.
+    /// Returns the index of the target that a grid belongs to. It is found by the identity of the
+    /// target that was used for labelling, or by the name if the detection lacks the identity.
+    /// `None` if the grid belongs to none of these targets.
     fn target_of(
         &self,
         grid: &Grid,
@@ -231,7 +232,7 @@ impl Reference<'_> {
         if let Some(index) = identities.iter().position(|own| own.is_same_print(seen)) {
             return Ok(Some(index));
         }
-        // Other targets in the same image do not matter, unless they can be mistaken for these.
+        // Other targets in the same image are ignored, unless they can be mistaken for these.
         let confusable = identities.iter().find(|own| own.is_confusable(seen));
         match confusable.or_else(|| identities.first().filter(|_| grid.target.is_none())) {
             Some(own) => Err(format!(
@@ -296,7 +297,7 @@ fn on_target(target: &Target, first: usize, grid: &Grid) -> Result<Option<Sighti
             }
             None => {
                 let swapped = places.contains_key(&(corner.col, corner.row));
-                let hint = if swapped { " (rows and columns exchanged?)" } else { "" };
+                let hint = if swapped { " (rows and columns swapped?)" } else { "" };
                 return Err(format!(
                     "{} has no corner in row {}, column {}{hint}{OTHER_TARGET}",
                     target.name, corner.row, corner.col
@@ -328,7 +329,7 @@ fn check_panel(target: &Target, panel: &Panel, grid: &Grid) -> Result<(), String
                 of_target.row,
                 of_target.col,
                 target.name,
-                if swapped { " (rows and columns exchanged?)" } else { "" }
+                if swapped { " (rows and columns swapped?)" } else { "" }
             ));
         }
         if of_target.is_none() {

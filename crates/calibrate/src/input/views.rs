@@ -12,19 +12,20 @@ use crate::excluded::{Excluded, Reason};
 use deltille_core::detection::Detection;
 use deltille_core::targets::TargetIdentity;
 
-/// Least excess of reversed over correctly oriented corners in a mirrored image, as a fraction of all corners. Only
-/// wrong corners are not reversed there.
+/// Minimum excess of reversed over correctly oriented corners in a mirrored image, as a fraction of
+/// all corners. In a mirrored image, only misplaced corners are not reversed.
 const MIRRORED_MOST: f64 = 0.5;
 
-/// Least excess in standard deviations. Misplaced corners have either orientation, and all of a few may be reversed by
-/// chance. One in a thousand images of misplaced corners only reaches this value by chance.
+/// Minimum excess in standard deviations. Misplaced corners have random orientations, and if there
+/// are only a few, all may be reversed by coincidence. Of images that contain only misplaced
+/// corners, one in a thousand reaches this value by coincidence.
 const MIRRORED_SURE: f64 = 3.09;
 
 /// The views of detections.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ViewSet {
-    /// One view for each image, or for each loose board in it.
+    /// One view for each image, or for each board in it if the boards are not fixed to each other.
     pub views: Vec<View>,
     /// Indices of the empty detections.
     pub empty: Vec<usize>,
@@ -32,8 +33,8 @@ pub struct ViewSet {
     pub excluded: Vec<(usize, Excluded)>,
 }
 
-/// A detection and the name of its view: that of its image, or another. Views of several cameras taken at the same time
-/// have the same name.
+/// A detection and the name of its view: the name of its image, or another name. Views of several
+/// cameras taken at the same time have the same name.
 #[derive(Clone, Copy, Debug)]
 pub struct Named<'a> {
     name: &'a str,
@@ -184,16 +185,17 @@ fn sightings(
     }
 }
 
-/// Whether nearly all corners with two neighbours are mirrored. In an image with two fifths of its corners misplaced,
-/// two fifths of these appear mirrored too, and a panel of a few corners may appear mirrored by chance.
+/// Whether nearly all corners with two neighbours are mirrored. If two fifths of the corners in an
+/// image are misplaced, two fifths of these appear mirrored too, and a panel of a few corners may
+/// appear mirrored by coincidence.
 fn is_mirrored(sightings: &[Sighting]) -> bool {
     let rotations: Vec<f64> = sightings.iter().flat_map(rotations).collect();
     let (count, more) = (rotations.len() as f64, rotations.iter().sum::<f64>());
     more > MIRRORED_MOST * count && more > MIRRORED_SURE * count.sqrt()
 }
 
-/// Orientation of each corner and its neighbours in column and row: 1 if they are mirrored. In an image (y down), rows
-/// and columns as on the print are oriented clockwise.
+/// Orientation of each corner and its neighbours in column and row: 1 if they are mirrored. In an
+/// image (y down), rows and columns that are not mirrored are oriented clockwise.
 fn rotations(sighting: &Sighting) -> Vec<f64> {
     let places: BTreeMap<(i32, i32), DVec2> =
         sighting.observations.iter().map(|o| ((o.row, o.col), o.pixel)).collect();
@@ -240,7 +242,8 @@ mod tests {
         }
     }
 
-    /// A panel of a few corners, most of them wrong, beside a panel that is not mirrored, and on its own.
+    /// A panel of a few corners, most of them wrong, next to a panel that is not mirrored, and
+    /// alone.
     #[test]
     fn a_few_wrong_corners_do_not_count_as_mirrored() {
         for seed in 0..100 {

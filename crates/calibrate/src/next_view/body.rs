@@ -7,32 +7,34 @@ use deltille_core::camera::{Camera, Pose, Projection};
 use deltille_core::polygon::hull;
 use deltille_core::targets::{Panel, Target};
 
-/// Number of corners used to judge a panel of a board or of a solid: more corners add time but no information. A solid
-/// shows several panels, so each has fewer.
+/// Number of corners used to evaluate a panel of a board or of a solid; more corners cost time
+/// without a benefit. A solid shows several panels, so each has fewer.
 const SAMPLED: [usize; 2] = [40, 14];
 
 /// Length of the arrow towards the upper side, as a fraction of the reach of the board.
 const UPWARDS: f64 = 0.4;
 
-/// Number of points along a side of an outline, which bends with the lens.
+/// Number of points along a side of an outline, which lens distortion bends.
 const STEPS: usize = 18;
 
-/// Stride over these points that suffices for the size of an outline.
+/// Stride over these points that suffices to measure the size of an outline.
 pub(super) const COARSE: usize = 3;
 
-/// Least edge length in the most foreshortened direction, px: tags are read from 12 px on, untagged grids are found
-/// from 7 px on (`docs/choosing.md`), and a person holds the board up to a quarter too far away.
+/// Minimum edge length in the most foreshortened direction, px. Tags can be read from 12 px,
+/// untagged grids can be found from 7 px (`docs/choosing.md`), and a person holds the board up to a
+/// quarter too far away.
 const TAGGED_EDGE_PX: f64 = 15.0;
 const PLAIN_EDGE_PX: f64 = 8.75;
 
-/// Cosine of the largest tilt. Corners are found up to 75°; the limit leaves a margin of 12° for a person.
+/// Cosine of the largest tilt. Corners are found up to 75°. The limit leaves a margin of 12° for
+/// errors of the person.
 const MAX_TILT_COS: f64 = 0.454;
 
 /// Margin that the window of the detector needs around a corner, px.
 const MARGIN_PX: f64 = 8.0;
 
-/// Least fraction of the corners inside the image: a board that is cut off is labelled if some tags are whole, and this
-/// fraction determines its pose well enough.
+/// Minimum fraction of the corners inside the image: a board that is cut off is labelled if some
+/// tags are whole, and this fraction determines its pose well enough.
 const MIN_PART: f64 = 0.5;
 
 /// A panel of a target.
@@ -42,7 +44,7 @@ pub(super) struct BodyPanel {
     /// The direction of its front in the target frame.
     normal: DVec3,
     pub corners: Vec<BodyCorner>,
-    /// Indices of the corners used for judging.
+    /// Indices of the corners used for evaluation.
     sampled: Vec<usize>,
     /// Indices of the outermost corners, which enclose all others.
     rim: Vec<usize>,
@@ -59,7 +61,7 @@ pub(super) struct BodyCorner {
     pub col: i32,
     /// Planned position in the panel frame, mm.
     pub panel_mm: DVec3,
-    /// Measured or else planned position in the target frame, mm.
+    /// Measured position in the target frame, mm; the planned one if it was not measured.
     pub target_mm: DVec3,
 }
 
@@ -101,8 +103,8 @@ impl Body {
         Some(Self { panels: panels.collect(), front, rotations })
     }
 
-    /// The corners that a detector finds with the target at a pose: all, or those used for judging. `None` if it finds
-    /// none, or too few for a view.
+    /// The corners that a detector finds with the target at a pose: all, or those used for
+    /// evaluation. `None` if it finds none, or too few for a view.
     pub(super) fn seen(&self, camera: &Camera, pose: &Pose, all: bool) -> Option<Vec<Seen>> {
         let mut seen = Vec::new();
         for (index, panel) in self.panels.iter().enumerate() {
@@ -111,7 +113,8 @@ impl Body {
         (!seen.is_empty()).then_some(seen)
     }
 
-    /// Outlines of the panels seen from the front, with every `every`-th point, px, as far as the lens images them.
+    /// Outlines of the panels seen from the front, with every `every`-th point, px, limited to the
+    /// points that the lens images.
     pub(super) fn outlines(&self, camera: &Camera, pose: &Pose, every: usize) -> Vec<Vec<DVec2>> {
         let panels = self.panels.iter().filter(|panel| panel.is_towards(pose));
         let outlines = panels.map(|panel| {

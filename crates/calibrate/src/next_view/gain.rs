@@ -25,20 +25,21 @@ use crate::uncertainty::known_so_far::KnownSoFar;
 use crate::uncertainty::projection::{by_motion, by_parameters, seen_at, solved};
 use deltille_core::camera::{Camera, PROJECTION_PARAMETERS};
 
-/// Number of positions along the longer side of the image at which projections are judged.
+/// Number of positions along the longer side of the image at which projections are evaluated.
 const POSITIONS: usize = 16;
 
 /// Prior standard deviation of each parameter: it shifts projections by this fraction of the longer image side, RMS.
 /// The prior keeps parameters finite that the corners do not determine.
 const EXPECTED_PART: f64 = 0.05;
 
-/// Prior standard deviation of the shape of a sheet, as a fraction of its reach: nobody calls anything more bent a
-/// board.
+/// Prior standard deviation of the shape of a sheet, as a fraction of its reach: a sheet that is
+/// bent more is hardly usable as a board.
 const EXPECTED_BEND: f64 = 0.02;
 
-/// The information on a camera from the views so far, and the projection uncertainty with another view.
+/// The information about a camera from the views so far, and the projection uncertainty with
+/// another view.
 pub(super) struct Gain {
-    /// The most likely camera, also where no corner was seen.
+    /// The most likely camera, including areas where no corner was seen.
     pub camera: Camera,
     /// Indices of the estimated parameters.
     free: Vec<usize>,
@@ -126,7 +127,8 @@ impl Gain {
         self.px(&self.known, &self.sums)
     }
 
-    /// The same with one more view of these corners; `None` if they do not determine its pose.
+    /// The projection uncertainty after one more view of these corners; `None` if they do not
+    /// determine its pose.
     pub(super) fn with_px(&self, body: &Body, seen: &[Seen], turn: &DMat3) -> Option<f64> {
         let count = self.free.len();
         let mut sums = Sums::zeros(self.unknowns());
@@ -240,9 +242,9 @@ fn places(camera: &Camera) -> impl Iterator<Item = DVec2> + use<> {
     })
 }
 
-/// The most likely camera under the prior of a lens, and the prior standard deviation of each parameter. A polynomial
-/// is unconstrained where no corner was; the prior returns undetermined directions to the start of the model and leaves
-/// determined ones unchanged.
+/// The most likely camera under the prior of a lens, and the prior standard deviation of each
+/// parameter. A polynomial is unconstrained where no corner was seen. The prior resets undetermined
+/// directions to the initial lens of the model and does not change determined ones.
 fn believed(
     camera: &Camera,
     start: Option<deltille_core::camera::Lens>,

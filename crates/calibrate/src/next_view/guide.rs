@@ -7,8 +7,9 @@
 //!                                              └→ projection uncertainty over the image with it
 //! ```
 //!
-//! This module opens no file and reads no clock: it takes estimates and returns a pose with its outline, figures and a
-//! sentence. [`HoldTracker`](super::holding::HoldTracker) detects when a person holds the board there.
+//! This module opens no file and reads no clock: it takes estimates and returns a pose with its
+//! outline, numbers and a sentence. [`HoldTracker`](super::holding::HoldTracker) detects when a person
+//! holds the board there.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -27,7 +28,8 @@ use crate::input::reference::Reference;
 use deltille_core::camera::{Camera, Lens, Pose};
 use deltille_core::targets::Target;
 
-/// Horizontal fields of view assumed before the first estimate, rad: of a webcam or telephone, and of a fisheye model.
+/// Horizontal fields of view assumed before the first estimate, rad: those of a webcam or a phone,
+/// and of a fisheye model.
 const ASSUMED_RAD: f64 = 1.15;
 const ASSUMED_FISHEYE_RAD: f64 = 2.0;
 
@@ -40,8 +42,8 @@ const FILLS: [f64; 3] = [0.4, 0.65, 0.95];
 /// Candidate tilts, rad: 30° and 50°, the largest that a person holds accurately.
 const TILTS: [f64; 2] = [0.52, 0.87];
 
-/// Default nearest distance, in multiples of the reach of the board (half of its diagonal): nearer boards are shaded by
-/// the camera, and few lenses are in focus there.
+/// Default nearest distance, in multiples of the reach of the board (half of its diagonal): the
+/// camera casts a shadow on nearer boards, and few lenses focus at this distance.
 const NEAREST: f64 = 1.0;
 
 /// Number of directions of a tilt.
@@ -55,11 +57,11 @@ const STEP: [f64; 6] = [0.08, 0.08, 0.18, 0.15, 0.3, 0.4];
 /// Number of times that steps are halved.
 const HALVINGS: usize = 2;
 
-/// Largest tilt, rad (55°): beyond it boards are neither held nor detected well.
+/// Largest tilt, rad (55°). Beyond it, boards are hard to hold and to detect.
 const MAX_TILT: f64 = 0.96;
 
-/// Least reduction of the uncertainty that is worth another view, as a fraction: the fifteenth of equally good images
-/// achieves it.
+/// Minimum reduction of the uncertainty that is worth another view, as a fraction. The fifteenth of
+/// a series of equally good images achieves it.
 const MIN_GAIN: f64 = 0.03;
 
 /// Proposes views for the calibration of one camera, one after the other.
@@ -96,8 +98,8 @@ pub struct NextView {
     /// Outlines of the panels seen from the front, px: polygons without repeated first point, which may reach beyond
     /// the image. A board has one.
     pub outlines: Vec<Vec<DVec2>>,
-    /// Arrow from the centre of the board towards its upper side (as its labels read), px. `None` if the lens does not
-    /// image it.
+    /// Arrow from the centre of the board towards its upper side (according to its labels), px.
+    /// `None` if the lens does not image it.
     pub upwards: Option<[DVec2; 2]>,
     /// The corners that are expected to be found.
     pub corners: Vec<ProposedCorner>,
@@ -109,7 +111,8 @@ pub struct NextView {
     pub tilt_rad: f64,
     /// Direction in the image in which the tilted board recedes, rad, clockwise from right.
     pub tilt_direction_rad: f64,
-    /// Rotation of the board in its plane, rad, counterclockwise as seen; 0 if its rows are level.
+    /// Rotation of the board in its plane, rad, counter-clockwise in the image; 0 if its rows are
+    /// level.
     pub roll_rad: f64,
     /// Projection uncertainty at infinity so far, px: the RMS over the whole image of the standard deviation per axis
     /// from noise, see [`ProjectionUncertainty`](crate::ProjectionUncertainty). `None` before there is an estimate.
@@ -145,8 +148,9 @@ impl Guide {
     /// Creates a guide for views of a target by a camera with a given model, or one that is known approximately. A
     /// known camera is recalibrated with all its parameters.
     ///
-    /// `None` if there is nothing to propose: a target without corners, an image without pixels, or a spline, whose
-    /// knots need corners everywhere. Take the images for a spline with another model.
+    /// `None` if there is nothing to propose: a target without corners, an image without pixels, or
+    /// a spline, whose knots need corners everywhere. To take images for a spline, use a guide with
+    /// another model.
     pub fn new(
         target: &Target,
         [width, height]: [u32; 2],
@@ -187,7 +191,7 @@ impl Guide {
     }
 
     /// Sets the nearest and the farthest distance, mm, at which boards can be held and are in focus. The defaults are
-    /// half of the board's diagonal, and the distance up to which corners are found.
+    /// half of the board's diagonal, and the largest distance at which corners are found.
     #[must_use]
     pub fn within_mm(self, nearest: Option<f64>, farthest: Option<f64>) -> Self {
         let [near, far] = self.distances_mm;
@@ -195,7 +199,8 @@ impl Guide {
         Self { distances_mm, ..self }
     }
 
-    /// Avoids views similar to these, which cannot be taken: a wall is in the way, or an arm too short.
+    /// Avoids views similar to these, which cannot be taken, for example because a wall is in the
+    /// way or an arm is too short.
     #[must_use]
     pub fn avoiding<'a>(self, refused: impl IntoIterator<Item = &'a NextView>) -> Self {
         let placings = refused.into_iter().map(|view| Placing {
@@ -213,8 +218,8 @@ impl Guide {
         [self.assumed.width, self.assumed.height]
     }
 
-    /// Calibrates the camera from these views and proposes the next one. This takes longer than [`Self::next`]; with
-    /// few or too similar views there is no estimate yet.
+    /// Calibrates the camera from these views and proposes the next one. This takes longer than
+    /// [`Self::next`]; with too few or too similar views, there is no estimate yet.
     pub fn after(&self, reference: &Reference, views: &[View]) -> Guided {
         let calibration = Calibration::of(reference, reference.panels());
         let calibration = calibration.camera("camera", views.to_vec(), self.intrinsics.clone());
@@ -224,7 +229,8 @@ impl Guide {
     }
 
     /// Proposes the next view after `taken` views. The estimate from them is of one camera with the model of this
-    /// guide. If it is missing or not informative enough, the view comes from the first set.
+    /// guide. If it is missing or not informative enough, the next view of the first set is
+    /// proposed.
     pub fn next(&self, taken: usize, estimate: Option<&Estimate>) -> NextView {
         let gain = estimate.and_then(|estimate| Gain::of(estimate, &self.body));
         let best = gain.as_ref().and_then(|gain| self.best(gain));
@@ -264,7 +270,7 @@ impl Guide {
             ..placing
         });
         placing.and_then(|placing| self.view(camera, placing)).unwrap_or_else(|| {
-            // Every lens images the centre.
+            // Every lens images the centre of the image.
             let [nearest, farthest] = self.distances_mm;
             let distance_mm = 1000.0f64.max(nearest).min(farthest);
             let placing = Placing { distance_mm, ..UPRIGHT };
@@ -286,14 +292,16 @@ impl Guide {
         let refined = judged.into_par_iter().map(|(start, px)| self.refined(gain, start, px));
         let mut refined: Vec<(Placing, f64)> = refined.collect();
         refined.sort_by(|a, b| a.1.total_cmp(&b.1));
-        // Candidates were judged by some corners; a board without tags needs all.
+        // Candidates were evaluated with some of the corners, but a board without tags needs all of
+        // them.
         refined.into_iter().find(|(placing, _)| {
             let pose = placing.pose(&gain.camera, &self.body);
             pose.is_some_and(|pose| self.body.seen(&gain.camera, &pose, true).is_some())
         })
     }
 
-    /// The projection uncertainty with a view; `None` if the board cannot be held or found there.
+    /// The projection uncertainty with an additional view; `None` if the board cannot be held or
+    /// found there.
     fn judge(&self, gain: &Gain, placing: &Placing) -> Option<f64> {
         let [nearest, farthest] = self.distances_mm;
         let is_far_enough = (nearest..=farthest).contains(&placing.distance_mm);
@@ -314,7 +322,7 @@ impl Guide {
         for (y, x) in AT.into_iter().flat_map(|y| AT.map(|x| (y, x))) {
             let upright = Placing { at: DVec2::new(x, y), ..UPRIGHT };
             for fill in FILLS {
-                // Tilted boards are at the distance of a facing one.
+                // Tilted boards have the same distance as a facing one.
                 let Some(facing) = upright.filling(fill, camera, &self.body) else { continue };
                 for roll in [0.0, FRAC_PI_2] {
                     all.push(Placing { roll, ..facing });
@@ -330,7 +338,7 @@ impl Guide {
         all
     }
 
-    /// Refines a candidate and its uncertainty by steps along one coordinate after the other.
+    /// Refines a candidate and its uncertainty by steps along one coordinate at a time.
     fn refined(&self, gain: &Gain, start: Placing, px: f64) -> (Placing, f64) {
         let mut best = (start, px);
         for halving in 0..=HALVINGS {
@@ -348,7 +356,7 @@ impl Guide {
         best
     }
 
-    /// The view with all its figures; `None` if the lens does not image the board there.
+    /// The view with all its numbers; `None` if the lens does not image the board there.
     fn view(&self, camera: &Camera, placing: Placing) -> Option<NextView> {
         let pose = placing.pose(camera, &self.body)?;
         Some(self.described(camera, pose, placing))
@@ -384,8 +392,9 @@ impl Guide {
 const UPRIGHT: Placing =
     Placing { at: DVec2::splat(0.5), distance_mm: 1.0, tilt: 0.0, away: 0.0, roll: 0.0 };
 
-/// Size and tilt of the first views: large, but small enough for a wrongly assumed field of view not to cut off the
-/// board; tilted by 40°, as only perspective reveals the focal length.
+/// Size and tilt of the first views: large, but small enough that an incorrectly assumed field of
+/// view does not cut off the board; tilted by 40°, because only perspective reveals the focal
+/// length.
 const FIRST_FILL: f64 = 0.7;
 const FIRST_TILT: f64 = 0.7;
 

@@ -12,16 +12,17 @@ use deltille_core::camera::Pose;
 use deltille_core::polygon::{area, clip, hull};
 use deltille_core::statistics::median;
 
-/// Least overlap of the proposed and the seen outline (intersection over union). For equal squares, a shift by a ninth
-/// of the side leaves 0.8; a person hardly does better, and such a view carries nearly the same information.
+/// Minimum overlap of the proposed and the detected outline (intersection over union). For equal
+/// squares, a shift by a ninth of the side leaves 0.8. A person is seldom more accurate, and the
+/// view then carries nearly the same information.
 const MIN_OVERLAP: f64 = 0.7;
 
-/// Largest angle between the normal and the proposed one, rad (12°). It distinguishes a facing board from one at the
-/// least proposed tilt.
+/// Largest angle between the normal and the proposed one, rad (12°). It distinguishes a facing
+/// board from one at the smallest proposed tilt.
 const MAX_ROTATION_RAD: f64 = 0.21;
 
-/// Largest motion blur of an edge, px: the standard deviation of a box of this width is a tenth of a pixel, small
-/// compared with the blur of any lens.
+/// Largest motion blur of an edge, px. The standard deviation of a box of this width is a tenth of
+/// a pixel, which is small compared with the blur of any lens.
 const MAX_SMEAR_PX: f64 = 0.35;
 
 /// Default exposure time, s: the longest of a webcam at 30 frames per second.
@@ -33,8 +34,8 @@ const HELD_S: f64 = 0.4;
 /// Largest interval between detections from which motion is computed, s.
 const FORGOTTEN_S: f64 = 1.0;
 
-/// Largest accepted blur (standard deviation), px: corners are three times less accurate there than at a blur of one
-/// pixel (`docs/benchmarks.md`, refined corners).
+/// Largest accepted blur (standard deviation), px: corners then have three times the standard
+/// deviation of corners at a blur of one pixel (`docs/benchmarks.md`, refined corners).
 const MAX_BLUR_PX: f64 = 3.0;
 
 /// Largest standard deviation of corners, px, if the blur is not given: beyond it the image is smeared or dark.
@@ -46,7 +47,7 @@ const MAX_SD_PX: f64 = 0.15;
 pub enum HoldStatus {
     /// No corner is visible.
     Unseen,
-    /// The board is elsewhere.
+    /// The board is at another position.
     Elsewhere {
         /// Overlap of both outlines (intersection over union), 0 to 1.
         overlap: f64,
@@ -72,7 +73,8 @@ pub enum HoldStatus {
     Taken,
 }
 
-/// Watches whether a board is held as proposed. The caller passes the time of each image, on any clock.
+/// Monitors whether a board is held in the proposed pose. The caller passes the time of each image,
+/// from any clock.
 #[derive(Clone, Debug)]
 pub struct HoldTracker {
     next: NextView,
@@ -87,8 +89,8 @@ pub struct HoldTracker {
 type Corners = BTreeMap<(PanelRef, i32, i32), DVec2>;
 
 impl HoldTracker {
-    /// Creates the watch for a proposed view; `panels` are the poses `target_from_panel` of the target's panels, see
-    /// [`Reference::panels`](crate::Reference::panels).
+    /// Creates the monitor of a proposed view; `panels` are the poses `target_from_panel` of the
+    /// target's panels, see [`Reference::panels`](crate::Reference::panels).
     pub fn new(next: &NextView, panels: impl IntoIterator<Item = Pose>) -> Self {
         Self {
             hull: hull(next.corners.iter().map(|corner| corner.pixel).collect()),
@@ -113,8 +115,9 @@ impl HoldTracker {
         Self { hold_s, ..self }
     }
 
-    /// Judges an image taken at a time, s. `blur_px` is the standard deviation of its blur, if it was measured;
-    /// otherwise the covariances of the corners show whether it is sharp.
+    /// Evaluates an image that was taken at time `time_s`, s. `blur_px` is the standard deviation
+    /// of its blur, if it was measured; otherwise the covariances of the corners show whether it is
+    /// sharp.
     pub fn observe(
         &mut self,
         time_s: f64,
@@ -167,7 +170,7 @@ impl HoldTracker {
             pose.and_then(|()| estimate_pose(&self.next.camera, &self.panels, &view.sightings));
         let off_rad = pose.map_or(0.0, |pose| {
             let [now, wanted] = [pose, self.next.camera_from_target].map(|pose| pose.rotation);
-            // A rotation in the plane of the board matters little, and without tags it is not known.
+            // A rotation in the plane of the board has little effect, and is unknown without tags.
             let off = view.sightings.iter().filter_map(|sighting| {
                 let normal = self.panels.get(sighting.panel.index())?.rotation * DVec3::Z;
                 Some((now * normal).angle_between(wanted * normal))

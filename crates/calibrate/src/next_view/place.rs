@@ -7,8 +7,8 @@ use glam::{DMat3, DQuat, DVec2};
 use super::body::{Body, COARSE};
 use deltille_core::camera::{Camera, Pose};
 
-/// Limits within which placements are similar: fraction of the image, rad (20°), and fraction of the distance; twice
-/// the error of a person.
+/// Limits within which placements are similar: fraction of the image, rad (20°), and fraction of
+/// the distance. They are twice the error of a person.
 const LIKE_AT: f64 = 0.12;
 const LIKE_RAD: f64 = 0.35;
 const LIKE_DEEP: f64 = 0.2;
@@ -24,7 +24,7 @@ pub(super) struct Placing {
     pub tilt: f64,
     /// Direction in the image in which it recedes, rad, clockwise from right.
     pub away: f64,
-    /// Rotation in its plane, rad, counterclockwise as seen.
+    /// Rotation in its plane, rad, counter-clockwise in the image.
     pub roll: f64,
 }
 
@@ -68,7 +68,8 @@ impl Placing {
     pub(super) fn filling(self, part: f64, camera: &Camera, body: &Body) -> Option<Self> {
         let size = DVec2::new(camera.width.into(), camera.height.into());
         let reach = body.reach_mm();
-        // Start from the size in the centre of a usual field of view, then scale the distance by the error.
+        // Starts from the size at the centre of a typical field of view, then scales the distance
+        // by the error.
         let mut placing = Self { distance_mm: 2.0 * reach / part, ..self };
         for _ in 0..ROUNDS {
             let outlines = body.outlines(camera, &placing.pose(camera, body)?, COARSE);
@@ -82,7 +83,8 @@ impl Placing {
     }
 }
 
-/// Number of iterations of the distance: each at least halves the error, as size is nearly inverse to distance.
+/// Number of iterations of the distance: each at least halves the error, because size is nearly
+/// inversely proportional to distance.
 const ROUNDS: usize = 5;
 
 impl Body {
@@ -95,7 +97,7 @@ impl Body {
 }
 
 impl Placing {
-    /// Whether a person could hardly distinguish the two placements.
+    /// Whether a person would consider the two placements the same.
     pub(super) fn is_like(&self, other: &Self) -> bool {
         let lean = |placing: &Self| placing.tilt * DVec2::from_angle(placing.away);
         let turn = (self.roll - other.roll + PI).rem_euclid(TAU) - PI;

@@ -56,7 +56,7 @@ fn held(target: &Target, next: &NextView, moved: Pose, index: usize) -> View {
     View { name, image: String::new(), size_px: [1280, 960], sightings }
 }
 
-/// The error of a person: some degrees and a hundredth of the distance, different each time.
+/// The error of a person: a few degrees and a hundredth of the distance, different each time.
 fn hand(next: &NextView, index: usize) -> Pose {
     let turn = DVec3::new(0.05, -0.03, 0.04) * if index.is_multiple_of(2) { 1.0 } else { -1.0 };
     let rotation = DQuat::from_scaled_axis(turn);
@@ -109,7 +109,8 @@ fn the_uncertainty_equals_that_of_the_map() {
     let count = map.columns * map.rows;
     let over_image = ((0..count).map(place).sum::<f64>() / count as f64).sqrt();
     let now = last.next.now_px.unwrap();
-    // Here all corners have equal weight in the alignment, there they are weighted by covariance.
+    // Here, all corners have equal weight in the alignment; in the estimate, they are weighted by
+    // covariance.
     assert!((now / over_image - 1.0).abs() < 0.05, "{now} {over_image}");
 }
 

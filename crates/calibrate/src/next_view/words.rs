@@ -30,7 +30,7 @@ const SIDES: [&str; 8] = [
 /// Largest offset from the image centre that counts as the middle, as a fraction of the image sides.
 const MIDDLE: f64 = 0.09;
 
-/// Smallest tilt or roll that is mentioned, rad (8°): nobody holds a board more accurately.
+/// Smallest tilt or roll that is mentioned, rad (8°): people do not hold a board more accurately.
 const MENTIONED: f64 = 0.14;
 
 /// Index of the nearest of the eight directions.
@@ -62,7 +62,7 @@ impl fmt::Display for NextView {
                 round_to_5(self.tilt_rad.to_degrees())
             )?,
         }
-        // An upside-down sheet has level rows too, but shows other corners there.
+        // An upside-down sheet also has level rows, but shows other corners at these positions.
         let roll = self.roll_rad.rem_euclid(TAU);
         let roll = if roll > 2.0 * FRAC_PI_2 { roll - TAU } else { roll };
         match roll {
@@ -82,7 +82,7 @@ fn round_to_5(degrees: f64) -> f64 {
     5.0 * (degrees / 5.0).round()
 }
 
-/// Formats a distance, rounded to what a person can judge.
+/// Formats a distance, rounded to the accuracy with which a person can estimate it.
 fn far(mm: f64) -> String {
     match mm {
         ..950.0 => format!("{:.0} cm", (mm / 50.0).round().max(1.0) * 5.0),

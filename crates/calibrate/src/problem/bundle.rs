@@ -23,7 +23,7 @@ pub(crate) struct Problem {
     pub panels: Vec<PanelUnknowns>,
     /// Observations.
     pub blocks: Vec<Block>,
-    /// The deviation of the sheet from its plan, if it is unknown; for one panel only.
+    /// The deviation of the sheet from its plan, if it is estimated; for one panel only.
     pub shape: Option<Shape>,
     /// The offset of each corner from its plan, if they are unknown.
     pub map: Option<CornerMap>,

@@ -1,4 +1,4 @@
-//! Offsets of corners without the directions that poses and distances absorb.
+//! Offsets of corners without the components that poses and distances absorb.
 
 use glam::DVec3;
 use nalgebra::{DMatrix, Matrix3};
@@ -8,8 +8,8 @@ use super::corner_map::{CornerMap, MappedCorner};
 use crate::input::panel::PanelRef;
 
 impl CornerMap {
-    /// The covariances of the offsets less the share of the directions that poses and distances
-    /// absorb (the gauge): in these directions only the prior determines the offsets, and fixes
+    /// The covariances of the offsets, minus the part from the directions that poses and distances
+    /// absorb (the gauge). In these directions, only the prior determines the offsets, and fixes
     /// them at zero. `covariances` are 3 × 3 for each corner, from the normal equations; `sigma` is
     /// the standard deviation of a whitened coordinate, the unit in which costs are counted.
     ///
@@ -55,15 +55,15 @@ impl CornerMap {
         covariances.iter().enumerate().map(of_corner).collect()
     }
 
-    /// The displacement of a corner, in the frame of its panel, that a vector field in the frame of
-    /// the target gives at its present place.
+    /// The displacement of a corner, in the frame of its panel, by a vector field in the frame of
+    /// the target, evaluated at the corner's current position.
     fn on_panel(&self, problem: &Problem, index: usize, field: &dyn Fn(DVec3) -> DVec3) -> DVec3 {
         let MappedCorner { panel, panel_mm, .. } = self.corners[index];
         let pose = problem.panels[panel.index()].target_from_panel;
         pose.rotation.conjugate() * field(pose.apply(panel_mm + self.offsets_mm[index]))
     }
 
-    /// For each corner the index of the group of panels that moves rigidly.
+    /// For each corner, the index of the group of panels that moves rigidly with it.
     fn rigid_groups(&self, problem: &Problem) -> Vec<usize> {
         let mut groups: Vec<(usize, Option<PanelRef>)> = Vec::new();
         let is_free = |panel: PanelRef| problem.panels[panel.index()].pose_free;

@@ -18,7 +18,7 @@ use deltille_core::statistics::median;
 /// Initial prior standard deviation, in edges: more than the error of any print.
 const FIRST_PRIOR: f64 = 0.01;
 
-/// Least prior standard deviation, mm: a hundredth of the resolution of the best print.
+/// Minimum prior standard deviation, mm: a hundredth of the resolution of the best print.
 const MIN_PRIOR_MM: f64 = 1e-4;
 
 /// A corner of a panel: index of the panel, row, column.
@@ -49,7 +49,7 @@ pub(crate) struct MappedCorner {
 }
 
 impl CornerMap {
-    /// All corners that blocks have observations of, with zero offsets and the first prior.
+    /// All corners that the blocks observe, with zero offsets and the initial prior.
     pub(crate) fn flat(blocks: &[Block]) -> Self {
         let mut index = BTreeMap::new();
         let mut corners: Vec<MappedCorner> = Vec::new();
@@ -86,7 +86,7 @@ impl CornerMap {
         self.corners.len()
     }
 
-    /// For each corner the number of blocks that observe it.
+    /// For each corner, the number of blocks that observe it.
     pub(crate) fn views(&self, blocks: &[Block]) -> Vec<usize> {
         let mut views = vec![0; self.len()];
         for block in blocks {
@@ -95,12 +95,12 @@ impl CornerMap {
         views
     }
 
-    /// The index of a corner, which the map must have.
+    /// The index of a corner, which must be in the map.
     pub(crate) fn index(&self, panel: PanelRef, seen: &Observation) -> usize {
         self.index[&(panel.index(), seen.row, seen.col)]
     }
 
-    /// The offset of a corner, mm; zero for a corner that the map does not have.
+    /// The offset of a corner, mm; zero for a corner that is not in the map.
     pub(crate) fn offset(&self, panel: PanelRef, seen: &Observation) -> DVec3 {
         let index = self.index.get(&(panel.index(), seen.row, seen.col));
         index.map_or(DVec3::ZERO, |&index| self.offsets_mm[index])
@@ -124,7 +124,7 @@ impl CornerMap {
     }
 }
 
-/// The median distance of a corner to the next in its row, mm; 1 without such pairs.
+/// The median distance of a corner to the next in its row, mm; 1 if there are no neighbours.
 fn nearest_mm(corners: &[MappedCorner]) -> f64 {
     let pairs = corners.iter().zip(corners.iter().skip(1));
     let in_a_row = pairs.filter(|(a, b)| (a.panel, a.row, a.col + 1) == (b.panel, b.row, b.col));

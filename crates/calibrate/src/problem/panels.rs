@@ -1,8 +1,8 @@
 //! Choice of the panels and targets whose poses are estimated.
 //!
-//! The target frame is that of the target file, fixed by the panel that was seen most; all other panels move relative
-//! to it. The scene frame is that of the first used target. Lengths are those of the panels, which are assumed to be
-//! true.
+//! The target frame is that of the target file. The panel that was seen most often fixes it; all
+//! other panels move relative to that panel. The scene frame is that of the first used target. The
+//! scale comes from the panels, whose lengths are assumed to be exact.
 
 use std::collections::BTreeSet;
 
@@ -64,8 +64,9 @@ pub(crate) fn fix_gauge(problem: &mut Problem, left_out: &[bool], calibration: &
     problem.targets = targets_unknown(&taking_part, calibration, &places);
 }
 
-/// The panel of a target to fix, and the panels connected with it by frames in which both were seen. It is the one seen
-/// most among those without an earlier measurement, as an earlier refinement fixed it too.
+/// The panel of a target to fix, and the panels connected with it by frames in which both were
+/// seen. It is the one seen most often among those without an earlier measurement, because an
+/// earlier refinement fixed it, too.
 fn connected(
     blocks: &[Block],
     calibration: &Calibration,

@@ -1,37 +1,39 @@
 //! The smoothness prior of the knots of a spline lens, which determines them where there are no
 //! corners.
 //!
-//! The prior expects a spline that images like some lens of a parametric family, and penalises the
-//! second differences of the difference d from it, along both axes and across (a discrete thin
-//! plate):
+//! The prior expects a spline equivalent to some lens of a parametric family. It penalises the
+//! second differences of the deviation d from that spline, along both axes and mixed (a discrete
+//! thin plate):
 //!
 //! ```text
 //!     |D d|² = Σ (d₋ − 2 d + d₊)²  along rows and columns  +  2 Σ (d − d→ − d↓ + d↘)²
 //!     d = knots − expected − T k,    k: what makes |D d|² least
 //! ```
 //!
-//! T holds the derivatives of the expected knots by the parameters of the family. With R = DᵀD and
-//! T made orthonormal, TᵀRT = 1, the penalty is dᵀ (R − RT TᵀR) d after elimination of k. Each
-//! difference is normal with one standard deviation s, which is estimated by maximising the
-//! marginal likelihood (empirical Bayes, MacKay 1992): with r the rank of that matrix and V the
-//! covariance of the knots, γ = r − tr((R − RT TᵀR) V)/s² is the number of differences that the
-//! corners determine better than the prior, and s² = |D d|²/γ. Functions that are linear in the
-//! plane have no penalty: three numbers for each coordinate, which any corners determine.
+//! T contains the derivatives of the expected knots with respect to the parameters of the family.
+//! With R = DᵀD and T made orthonormal, TᵀRT = 1, the penalty is dᵀ (R − RT TᵀR) d after
+//! elimination of k. Each difference is normal with one standard deviation s, which is estimated by
+//! maximising the marginal likelihood (empirical Bayes, MacKay 1992): with r the rank of that
+//! matrix and V the covariance of the knots, γ = r − tr((R − RT TᵀR) V)/s² is the number of
+//! differences that the corners determine better than the prior, and s² = |D d|²/γ. Functions that
+//! are linear in the plane have no penalty. They have three coefficients for each coordinate, which
+//! any corners determine.
 
 use glam::DVec2;
 use nalgebra::{DMatrix, DVector};
 
 use deltille_core::camera::{Camera, Lens, PROJECTION_PARAMETERS, Spline, SplineGrid};
 
-/// Initial standard deviation of a second difference, in knot distances: a tenth is more than any lens differs from its
-/// parametric model, so the corners decide.
+/// Initial standard deviation of a second difference, in knot distances: a tenth exceeds the
+/// deviation of any lens from its parametric model, so the corners dominate.
 const FIRST_PART: f64 = 0.1;
 
-/// Least standard deviation of a second difference, in knot distances: a ten-thousandth of a pixel for knots a hundred
-/// pixels apart.
+/// Minimum standard deviation of a second difference, in knot distances: a ten-thousandth of a
+/// pixel for knots a hundred pixels apart.
 const MIN_PART: f64 = 1e-6;
 
-/// Exponent of the over-relaxation of the update of s: plain fixed-point steps are small, and all in one direction.
+/// Exponent of the over-relaxation of the update of s, because plain fixed-point steps are small
+/// and all have the same direction.
 const FARTHER: f64 = 1.5;
 
 /// A direction of the family counts as independent if this fraction of its squared length is

@@ -12,7 +12,8 @@ pub(crate) const STRETCH: usize = 7;
 
 /// The deviation of a board's sheet from its plan: bent, stretched and sheared.
 ///
-/// With u, v the position on the board from its centre, in units of the distance of the farthest corner,
+/// With u, v the position on the board from its centre, in units of the distance to the farthest
+/// corner,
 ///
 /// ```text
 ///     z  = b₁ u² + b₂ u v + b₃ v² + b₄ u³ + b₅ u² v + b₆ u v² + b₇ v³
@@ -52,7 +53,7 @@ pub struct BoardShape {
 const SIGNIFICANT_F: f64 = 3.1;
 
 impl BoardShape {
-    /// Whether the shape is significant: noise alone would seldom explain it for a flat sheet.
+    /// Whether the shape is significant: for a flat sheet, noise alone would seldom cause it.
     pub fn is_significant(&self) -> bool {
         self.f_ratio > SIGNIFICANT_F
     }
@@ -67,7 +68,7 @@ impl Shape {
         Self { middle_mm, reach_mm: reach_mm.max(f64::MIN_POSITIVE), coefficients_mm: [0.0; COUNT] }
     }
 
-    /// The displacement of a point of the plan per unit of each coefficient.
+    /// The displacement of a planned point per unit of each coefficient.
     pub(crate) fn directions(&self, at: DVec3) -> [DVec3; COUNT] {
         let DVec3 { x: u, y: v, .. } = (at - self.middle_mm) / self.reach_mm;
         let up = |z: f64| DVec3::new(0.0, 0.0, z);
@@ -84,7 +85,7 @@ impl Shape {
         ]
     }
 
-    /// The displacement of a point of the plan.
+    /// The displacement of a planned point.
     pub(crate) fn offset(&self, at: DVec3) -> DVec3 {
         let moved = self.directions(at).into_iter().zip(self.coefficients_mm);
         moved.map(|(direction, mm)| direction * mm).sum()

@@ -59,7 +59,8 @@ impl Prior {
     /// Creates the prior of a measured pose; `None` if the covariance has no inverse.
     pub(crate) fn new(pose: Pose, covariance: [[f64; 6]; 6]) -> Option<Self> {
         let covariance = Matrix6::from_fn(|i, j| covariance[i][j]);
-        // Rotations and translations have different units: their scale must not look like a rank deficiency.
+        // Rotations and translations have different units. Scaling keeps this from looking like a
+        // rank deficiency.
         let scale = Vector6::from_fn(|i, _| covariance[(i, i)].sqrt().recip());
         let scaled = Matrix6::from_fn(|i, j| covariance[(i, j)] * scale[i] * scale[j]);
         let inverse = scaled.cholesky()?.inverse();
@@ -67,7 +68,7 @@ impl Prior {
         information.iter().all(|v| v.is_finite()).then_some(Self { pose, information })
     }
 
-    /// Deviation of a pose from the measured one as (ω, τ), and the inverse covariance of that.
+    /// Deviation (ω, τ) of a pose from the measured one, and its inverse covariance.
     pub(crate) fn off(&self, pose: &Pose) -> (Vector6<f64>, Matrix6<f64>) {
         let [turn, moved] = pose.off(&self.pose);
         let off = Vector6::new(turn.x, turn.y, turn.z, moved.x, moved.y, moved.z);

@@ -7,13 +7,14 @@ use super::unknowns::Block;
 use crate::input::weights::Weights;
 use deltille_core::statistics::median;
 
-/// The median of a squared distance in the plane whose coordinates have variance 1: 2 ln 2.
+/// The median of a squared distance in the plane, for coordinates with variance 1: 2 ln 2.
 pub(crate) const MEDIAN_OF_CHI_SQUARED_2: f64 = 1.386_294_361_119_890_6;
 
-/// Number of halvings of the interval for the common standard deviation: to 1e-9 of its upper end.
+/// Number of bisections for the common standard deviation; they reach 1e-9 of the upper bound.
 const HALVINGS: usize = 30;
 
-/// Least standard deviation of residuals: far below that of any corner, so that exact data do not divide by zero.
+/// Minimum standard deviation of residuals: far below that of any corner, so that exact data do not
+/// divide by zero.
 const MIN_SIGMA: f64 = 1e-6;
 
 /// Limit of an outlier in standard deviations: four in a million corners with normal errors exceed it.
@@ -23,7 +24,8 @@ pub(crate) const OUTLIER_SIGMA: f64 = 5.0;
 #[derive(Clone, Debug)]
 pub(crate) struct Whitening {
     pub blocks: Vec<Vec<[f64; 3]>>,
-    /// The common standard deviation besides the covariances, px; `None` if all corners have equal weight.
+    /// The common standard deviation in addition to the covariances, px; `None` if all corners have
+    /// equal weight.
     pub common_px: Option<f64>,
     /// Standard deviation of a whitened coordinate, from the median.
     pub sigma: f64,
@@ -53,7 +55,7 @@ impl Whitening {
         whitening
     }
 
-    /// Weights that fit the residuals at hand.
+    /// Weights that fit the current residuals.
     pub(crate) fn fit(problem: &Problem, weights: Weights, residuals: &[Vec<DVec2>]) -> Self {
         let covariances = match weights {
             Weights::Equal => None,
@@ -97,18 +99,19 @@ impl Whitening {
     }
 }
 
-/// The fraction of the squared residuals that the unknowns leave. If corners are unknown too, few views leave little.
+/// The fraction of the squared residuals that remains after fitting the unknowns. If the corners
+/// are unknown, too, and there are few views, this fraction is small.
 fn left_free(problem: &Problem) -> f64 {
     let Some(map) = &problem.map else { return 1.0 };
     let unknowns = map.determined + 6.0 * problem.frames.len() as f64;
     (1.0 - unknowns / (2.0 * problem.count().max(1) as f64)).max(MIN_FREE)
 }
 
-/// Least value of that fraction: two views of a corner leave a quarter.
+/// Minimum of that fraction, which is a quarter for two views of a corner.
 const MIN_FREE: f64 = 0.25;
 
-/// The covariances of all corners; `None` if no corner has one. A corner without one among
-/// others that have one was the hardest to refine: it gets the largest variance of all.
+/// The covariances of all corners; `None` if no corner has one. If only some corners have a
+/// covariance, the others were the hardest to refine and get the largest variance of all.
 fn covariances(problem: &Problem) -> Option<Vec<Vec<[f64; 3]>>> {
     let all = || problem.blocks.iter().flat_map(|block| block.observations.iter());
     let largest = all().filter_map(|o| o.cov).map(|[xx, _, yy]| xx.max(yy)).fold(0.0, f64::max);

@@ -21,15 +21,15 @@ use crate::problem::whitening::scale;
 use deltille_core::camera::{Camera, Lens, Pose};
 use deltille_core::statistics::median;
 
-/// Least number of views: two views of a plane determine focal length and principal point if there are no errors; a
-/// third reveals errors.
+/// Minimum number of views: two views of a plane determine focal length and principal point if
+/// there are no errors; a third view reveals errors.
 const MIN_VIEWS: usize = 3;
 
 /// Parametric lenses from which a spline may start: a fisheye and a perspective lens.
 const FORERUNNERS: [Model; 2] = [Model::KannalaBrandt(4), Model::Radtan5];
 
-/// Largest difference of normals of parallel boards. Corner noise of a twentieth of a pixel on a board of 500 px
-/// already looks like a tilt of one degree.
+/// Largest angle between the normals of boards that count as parallel. Corner noise of a twentieth
+/// of a pixel on a board of 500 px already causes an apparent tilt of one degree.
 const PARALLEL_RAD: f64 = 0.05;
 
 pub(crate) fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
@@ -52,7 +52,7 @@ pub(crate) fn start(calibration: &Calibration) -> Result<Start, CalibrationError
     Ok(Start { problem, frames, excluded, delays: vec![0], rotations: vec![None] })
 }
 
-/// Rejects too few views for a calibration.
+/// Returns an error if there are too few views for a calibration.
 pub(crate) fn enough(found: usize, all: usize) -> Result<(), CalibrationError> {
     match found < MIN_VIEWS {
         true => Err(CalibrationError::TooFewViews { found, all, needed: MIN_VIEWS }),
@@ -159,7 +159,8 @@ impl<'a> Search<'a> {
         Ok(Self { views, panels, camera: camera.clone(), roughness: None, poses })
     }
 
-    /// The views that have a pose and that the camera can image, and the problem of their observations.
+    /// The views that have a pose and that the camera can image, and the problem that consists of
+    /// their observations.
     fn problem(&self, views: &[View], free: Vec<bool>) -> (Vec<usize>, Problem) {
         let mut camera = CameraUnknowns::alone(self.camera.clone(), free);
         if let Some(roughness) = &self.roughness {
@@ -228,7 +229,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Rejects views of a board that was never tilted.
+/// Returns an error if the board was never tilted.
 fn check_tilts(poses: &[Option<Pose>]) -> Result<(), CalibrationError> {
     let normals = || poses.iter().flatten().map(|pose| pose.rotation * DVec3::Z);
     let mean = normals().sum::<DVec3>().normalize_or(DVec3::Z);

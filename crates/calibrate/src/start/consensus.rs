@@ -1,25 +1,24 @@
-//! Consensus among the corners of an image, before anything is known of the camera.
+//! Consensus among the corners of an image, before anything is known about the camera.
 //!
-//! Through any lens three neighbours in a row are imaged nearly in a row, at nearly equal
-//! distances:
+//! Any lens images three neighbours in a row nearly in a row, at nearly equal distances:
 //!
 //! ```text
 //!     a ───── b ───── c        |a − 2b + c| < ¼ |c − a|
 //! ```
 //!
-//! Corners that such triples connect belong to one smooth map of the board. The largest connected
-//! set is correct where most corners are: wrong positions connect to nothing, and labels that are
-//! off by a tile connect to each other only. A calibration starts from this set; the final set of
-//! corners is decided again with the estimated camera.
+//! Corners that are connected by these triples belong to one smooth map of the board. The largest
+//! connected set is correct if most corners are: wrong positions connect to nothing, and labels
+//! that are off by a tile connect only to each other. A calibration starts from this set. The final
+//! set of corners is selected later with the estimated camera.
 
 use std::collections::BTreeMap;
 
 use crate::input::observation::{MIN_CORNERS, Observation, Sighting, View};
 use deltille_core::statistics::median;
 
-/// Greatest deviation of the middle corner from the mean of its neighbours, as a fraction of their
-/// distance: the two distances are then as 5 to 3 at most, which a board shows only where it nearly
-/// touches the lens. A label that is off by a tile gives a third.
+/// Maximum deviation of the middle corner from the mean of its neighbours, as a fraction of their
+/// distance. The ratio of the two distances is then at most 5 : 3. A board shows this ratio only
+/// where it nearly touches the lens. A label that is off by a tile gives a third.
 const UNEVEN: f64 = 0.25;
 
 /// Steps (rows, columns) between neighbours, on either lattice.
@@ -29,12 +28,12 @@ const STEPS: [(i32, i32); 4] = [(0, 1), (1, 0), (1, -1), (1, 1)];
 /// the long ones of rhombi.
 const LONGEST_STEP: f64 = 1.5;
 
-/// Longest triple relative to the usual length: three wrong corners may lie in a row, but hardly at
-/// the distance of neighbours.
+/// Longest triple relative to the usual length. Three wrong corners may lie in a row, but hardly
+/// ever at the distance of neighbours.
 const LONGEST_TRIPLE: f64 = 4.0;
 
-/// The view with only the corners of each sighting that agree, and only the sightings that have
-/// some; the view unchanged where none has, as on panels of a few corners.
+/// The view with only those corners of each sighting that agree, and only the sightings that have
+/// any. If no sighting has any, for example on panels of a few corners, the view is unchanged.
 pub(super) fn agreeing(view: &View) -> View {
     let of_sighting = |sighting: &Sighting| {
         let agree = largest_agreement(&sighting.observations)?;
@@ -48,7 +47,7 @@ pub(super) fn agreeing(view: &View) -> View {
     }
 }
 
-/// Indices of the largest set of corners that triples connect; `None` where it is too small for a
+/// Indices of the largest set of corners that triples connect; `None` if it is too small for a
 /// pose.
 fn largest_agreement(corners: &[Observation]) -> Option<Vec<usize>> {
     let triples = agreeing_triples(corners);

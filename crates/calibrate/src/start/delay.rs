@@ -1,8 +1,9 @@
 //! Detection of cameras that lag by some frames: a missed trigger, or a recording that began later.
 //!
 //! The relative pose of two cameras that see one target is the same in all frames if the images were taken at the same
-//! time. Rotations between frames are equally large for every camera, whatever target it sees. The lag is the shift at
-//! which the relative poses, or without a common target the rotations, scatter least.
+//! time. Rotations between frames are equally large for every camera, regardless of the target that
+//! it sees. The lag is the shift at which the relative poses scatter least. Without a common
+//! target, the scatter of the rotations is used.
 
 use std::collections::BTreeMap;
 
@@ -15,15 +16,16 @@ use deltille_core::statistics::median;
 /// Largest lag that is detected, frames.
 const MAX_DELAY: i32 = 10;
 
-/// Least and greatest number of frames used for comparing lags: more do not help.
+/// Minimum and maximum number of frames used for comparing lags; more frames do not help.
 const MIN_MOMENTS: usize = 8;
 const MAX_MOMENTS: usize = 60;
 
-/// Factor by which the scatter at the lag must be smaller than without. A target that hardly moved, or moved uniformly
-/// from frame to frame, does not reveal a lag, and does not need it corrected.
+/// Factor by which the scatter at the lag must be smaller than without the lag. A target that
+/// hardly moved, or moved uniformly from frame to frame, does not reveal a lag, and the lag then
+/// needs no correction.
 const DECISIVE: f64 = 3.0;
 
-/// Greatest number of frames over which rotations are compared.
+/// Maximum number of frames over which rotations are compared.
 const LONGEST_SPAN: usize = 3;
 
 /// The observations of a camera in each frame, in order.
@@ -63,7 +65,7 @@ pub(super) fn delays(
     found.into_iter().map(|delay| delay - usual).collect()
 }
 
-/// The most frequent lag; among equally frequent ones that of the first camera, if it is among them.
+/// The most frequent lag; of equally frequent lags, that of the first camera, if it is one of them.
 fn usual(delays: &[i32]) -> i32 {
     let count = |delay: &i32| delays.iter().filter(|other| *other == delay).count();
     let most = delays.iter().map(count).max().unwrap_or_default();
@@ -87,7 +89,7 @@ fn delay_between(from: &Track, to: &Track, symmetries: &Symmetries) -> Option<(i
         Some((_, (scatter, moments))) => (*scatter, *moments),
         None => (usual()?, moments),
     };
-    // Chance agreement in a few frames does not outweigh agreement in many.
+    // Coincidental agreement in a few frames does not outweigh agreement in many.
     match DECISIVE * least < compared && 2 * moments >= of_moments {
         true => Some((delay, moments)),
         false => Some((0, of_moments)),
@@ -160,7 +162,8 @@ pub(super) fn in_time(calibration: &Calibration, delays: &[i32], seen: &mut ByFr
                 .and_then(|&place| place.checked_add_signed(-(delay as isize)));
             match place.and_then(|place| order.get(place)) {
                 Some(moment) => moment.clone(),
-                // Before the first frame of the others, or after their last.
+                // The lag leads to a time before the first frame of the others, or after their
+                // last.
                 None => format!("{name} of {}", camera.name),
             }
         };

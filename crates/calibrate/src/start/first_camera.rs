@@ -1,7 +1,8 @@
 //! A first camera without a guess.
 //!
-//! Among ideal cameras, perspective and equidistant, of all focal lengths and with a central principal point, the
-//! search selects the one under which the views look most like views of planes. Up to half of the views may be wrong.
+//! The candidates are ideal perspective and equidistant cameras of all focal lengths with a central
+//! principal point. The search selects the one for which the views fit planes best. Up to half of
+//! the views may be wrong.
 
 use super::pose::planar_pose;
 use crate::input::observation::{Observation, View};
@@ -10,14 +11,15 @@ use crate::model::Model;
 use deltille_core::camera::{BrownConrady, Camera, KannalaBrandt, Lens, Pose};
 use deltille_core::statistics::median;
 
-/// Trial focal lengths, in image widths: from all-around lenses to those with a field of view of a degree.
+/// Trial focal lengths, in image widths: from all-round lenses to those with a field of view of one
+/// degree.
 const SHORTEST: f64 = 0.12;
 const LONGEST: f64 = 60.0;
 
-/// Ratio of successive trial focal lengths; bundle adjustment converges from much farther.
+/// Ratio of successive trial focal lengths; bundle adjustment converges from much larger errors.
 const RATIO: f64 = 1.1;
 
-/// Number of views used, evenly over the sequence, and number of corners in each.
+/// Number of views used, evenly spaced over the sequence, and number of corners used in each.
 const MAX_VIEWS: usize = 15;
 const MAX_CORNERS: usize = 40;
 

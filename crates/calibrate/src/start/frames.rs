@@ -13,7 +13,7 @@ pub(crate) struct Start {
     pub excluded: Vec<(usize, Excluded)>,
     /// Lag of each camera in frames.
     pub delays: Vec<i32>,
-    /// The rotation of each camera's labels, if a symmetry of the board leaves that open.
+    /// The rotation of each camera's labels, if a symmetry of the board makes the labels ambiguous.
     pub rotations: Vec<Option<LabelRotation>>,
 }
 

@@ -1,4 +1,5 @@
-//! Poses of cameras on the rig and of targets in the scene, from the results of each camera on its own.
+//! Poses of cameras on the rig and of targets in the scene, from the separate results of each
+//! camera.
 //!
 //! ```text
 //!   two cameras that see one target in one frame  ─→ camera_from_camera
@@ -14,10 +15,11 @@ use crate::error::{CalibrationError, DegenerateMotion};
 use crate::input::calibration::Calibration;
 use deltille_core::camera::Pose;
 
-/// Least number of frames that two cameras must share: one may be wrong, but the median of three is right.
+/// Minimum number of frames that two cameras must share. One frame may be wrong, but the median of
+/// three is correct.
 pub(super) const MIN_SHARED: usize = 3;
 
-/// The view of a target by a camera on its own.
+/// The view of a target by a single camera.
 #[derive(Clone, Copy)]
 pub(super) struct Seen {
     /// Index of the target.
@@ -33,7 +35,7 @@ pub(super) struct Seen {
 /// The views of each camera, by the name of the frame.
 pub(super) type ByFrame = Vec<BTreeMap<String, Vec<Seen>>>;
 
-/// The poses of everything that does not move.
+/// The poses of all cameras and targets that are fixed.
 pub(super) struct Places {
     pub camera_from_rig: Vec<Pose>,
     pub scene_from_target: Vec<Pose>,
@@ -59,7 +61,8 @@ impl Places {
         linking.placed()
     }
 
-    /// The pose of the scene in a frame, from the view with the most corners, whose pose is the best.
+    /// The pose of the scene in a frame, from the view with the most corners, because its pose is
+    /// the most accurate.
     pub(super) fn rig_from_scene(&self, of_frame: &[(usize, &Seen)]) -> Option<Pose> {
         let best = of_frame.iter().max_by_key(|(_, seen)| seen.corners);
         best.map(|(camera, seen)| {
@@ -99,7 +102,8 @@ impl Linking<'_> {
         }
     }
 
-    /// Without a target of known pose, the scene frame is that of the first target seen by a placed camera.
+    /// Without a target of known pose, the scene frame is that of the first target seen by a camera
+    /// of known pose.
     fn place_first_target(&mut self) {
         if self.targets.iter().any(Option::is_some) {
             return;
@@ -114,7 +118,7 @@ impl Linking<'_> {
         (0..places.len()).filter(move |&index| places[index].is_some() == is_placed)
     }
 
-    /// Places a camera relative to the one with which it shares the most frames.
+    /// Locates a camera relative to the one with which it shares the most frames.
     fn by_common_target(&mut self) -> bool {
         let from = Self::indices(&self.cameras, true);
         let to = |from: usize| Self::indices(&self.cameras, false).map(move |to| (from, to));
@@ -154,7 +158,7 @@ impl Linking<'_> {
         best.into_iter().map(|(name, (_, pose))| (name, pose)).collect()
     }
 
-    /// Places the target that placed cameras see in the most known frames.
+    /// Locates the target that located cameras see in the largest number of known frames.
     fn target_in_known_frames(&mut self) -> bool {
         let frames = self.known_frames();
         let of_target = |target: usize| {
@@ -182,7 +186,7 @@ impl Linking<'_> {
         true
     }
 
-    /// Places the camera that sees placed targets in the most known frames.
+    /// Locates the camera that sees located targets in the largest number of known frames.
     fn camera_in_known_frames(&mut self) -> bool {
         let frames = self.known_frames();
         let of_camera = |camera: usize| {
@@ -206,7 +210,7 @@ impl Linking<'_> {
         true
     }
 
-    /// Places a camera together with a target that only such cameras see.
+    /// Locates a camera together with a target, if only cameras of unknown pose see the target.
     fn by_motion(&mut self) -> bool {
         let frames = self.known_frames();
         let of_pair = |camera: usize, target: usize| {
@@ -235,7 +239,7 @@ impl Linking<'_> {
         false
     }
 
-    /// Returns all poses relative to the first target, or an error if something is not placed.
+    /// Returns all poses relative to the first target, or an error if a pose is still unknown.
     fn placed(self) -> Result<Places, CalibrationError> {
         let calibration = self.calibration;
         let open: Vec<usize> = Self::indices(&self.cameras, false).collect();
@@ -275,8 +279,8 @@ impl Linking<'_> {
     }
 }
 
-/// The number of frames that show the same target to two cameras, and the pose of the second relative to the first from
-/// each.
+/// The number of frames that show the same target to two cameras, and the pose of the second
+/// relative to the first from each frame.
 pub(super) fn common(
     from: &BTreeMap<String, Vec<Seen>>,
     to: &BTreeMap<String, Vec<Seen>>,

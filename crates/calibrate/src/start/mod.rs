@@ -6,9 +6,10 @@
 //!    them planar.
 //! 2. `pose` computes the pose of a target in one image; `splined` converts a lens to a spline.
 //! 3. `alone` combines these for one camera.
-//! 4. `together` solves every camera on its own, then combines them: `delay` (lag of each camera in frames), `symmetry`
-//!    (labels of a board that looks the same after a rotation), `linked` (poses between cameras and targets that share
-//!    frames), and `motion` (those that share none, from the motion of the rig).
+//! 4. `together` solves every camera separately, then combines them: `delay` (lag of each camera in
+//!    frames), `symmetry` (labels of a board that looks the same after a rotation), `linked` (poses
+//!    between cameras and targets that share frames), and `motion` (those that share none, from the
+//!    motion of the rig).
 
 pub(crate) mod alone;
 pub(crate) mod consensus;

@@ -1,13 +1,15 @@
 //! The poses of a camera and a target that share no frame with the others, from the motion of the rig.
 //!
-//! A camera that sees only a target of its own, fixed to the others while the rig moves, has in every frame
+//! For a camera that sees only its own target, which is fixed to the others while the rig moves,
+//! every frame gives
 //!
 //! ```text
 //!     camera_from_target = camera_from_rig · rig_from_scene · scene_from_target
 //! ```
 //!
-//! with the first and the last link the same in all frames. The rotations alone are linear in the two (Shah 2013), and
-//! the positions follow from them. If the rig rotates about one axis only, a shift of both along it is undetermined.
+//! where the first and the last link are the same in all frames. The equations of the rotations
+//! alone are linear in the two links (Shah 2013), and the positions follow from the rotations. If
+//! the rig rotates about one axis only, a shift of both along this axis is undetermined.
 
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector6};
@@ -16,13 +18,14 @@ use crate::error::DegenerateMotion;
 use deltille_core::camera::Pose;
 use deltille_core::statistics::median;
 
-/// Least rotation about a second axis, rad (1°): more than the noise of poses.
+/// Minimum rotation about a second axis, rad (1°): more than the noise of poses.
 const MIN_ROTATION_RAD: f64 = 0.017;
 
-/// Number of reweighting rounds, in which frames that do not fit lose their weight.
+/// Number of reweighting iterations, in which frames that do not fit lose their weight.
 const ROUNDS: usize = 10;
 
-/// The observations of one frame: the pose of the rig by the other cameras, and the pose of the target in the camera.
+/// The observations of one frame: the pose of the rig from the other cameras, and the pose of the
+/// target relative to the camera.
 #[derive(Clone, Copy)]
 pub(super) struct Moment {
     pub rig_from_scene: Pose,
@@ -60,7 +63,7 @@ fn posed(rotations: [DQuat; 2], places: [DVec3; 2]) -> [Pose; 2] {
     [0, 1].map(|i| Pose { rotation: rotations[i], translation: places[i] })
 }
 
-/// Rejects a rig that did not rotate about two axes.
+/// Returns an error if the rig did not rotate about two axes.
 fn check_rotations(moments: &[Moment]) -> Result<(), DegenerateMotion> {
     let Some(first) = moments.first() else { return Err(DegenerateMotion::NoRotation) };
     let back = first.rig_from_scene.rotation.conjugate();

@@ -16,15 +16,15 @@ use deltille_core::statistics::median;
 /// Number of corners that determine a homography.
 const MIN_RAYS: usize = 4;
 
-/// Number of panels, the largest first, that give initial poses: two of them may be wrong.
+/// Number of panels that give initial poses, the largest first; two of them may be wrong.
 const STARTS: usize = 3;
 
-/// Panels do not fit a pose if their error exceeds that of the best panel by this factor.
+/// A panel does not fit a pose if its error exceeds that of the best panel by this factor.
 const DISAGREE: f64 = 5.0;
 
-/// Computes the pose `camera_from_target`; `panels` are the poses of the target's panels on it. For one panel it
-/// minimises the squared error of all corners; for several it is the pose on which most corners agree. `None` if the
-/// corners lie on a line or the camera cannot image them.
+/// Computes the pose `camera_from_target`; `panels` are the poses of the panels on the target. For
+/// one panel it minimises the squared error of all corners; for several it is the pose on which
+/// most corners agree. `None` if the corners lie on a line or the camera cannot image them.
 pub(crate) fn estimate_pose(
     camera: &Camera,
     panels: &[Pose],
@@ -79,7 +79,8 @@ fn pose_from(
 ) -> Option<Pose> {
     let camera_from_panel = planar_pose(camera, &largest.observations)?;
     let start = camera_from_panel.after(&panels[largest.panel.index()].inverse());
-    // From afar, a panel looks nearly the same when its tilt is mirrored at the line of sight.
+    // From a distance, a panel looks nearly the same if its tilt is mirrored about the line of
+    // sight.
     let centre = largest.observations.iter().map(|o| o.panel_mm).sum::<DVec3>()
         / largest.observations.len() as f64;
     let mirrored =
@@ -90,8 +91,8 @@ fn pose_from(
 }
 
 /// The pose of a plane from the rays to its points. With a homography H from the plane to the rays
-/// b ∼ H (x, y, 1), each point gives b × H (x, y, 1) = 0; H = (r1, r2, t) up to scale. Rays may point
-/// backwards too: the sign is that for which H (x, y, 1) lies along b.
+/// b ∼ H (x, y, 1), each point gives b × H (x, y, 1) = 0; H = (r1, r2, t) up to scale. Rays may
+/// point backwards, too. The sign is chosen so that H (x, y, 1) points along b.
 pub(crate) fn planar_pose(camera: &Camera, observations: &[Observation]) -> Option<Pose> {
     let n = observations.len() as f64;
     let centre = observations.iter().map(|o| o.panel_mm).sum::<DVec3>() / n;
@@ -142,7 +143,7 @@ pub(crate) fn planar_pose(camera: &Camera, observations: &[Observation]) -> Opti
     Some(Pose { rotation, translation: t - rotation * centre })
 }
 
-/// The pose with its plane mirrored at the line of sight to `centre`, which stays fixed.
+/// The pose with its plane mirrored about the line of sight to `centre`, which remains fixed.
 fn mirrored(pose: &Pose, centre: DVec3) -> Pose {
     let seen = pose.apply(centre);
     let sight = seen.normalize_or(DVec3::Z);
@@ -203,8 +204,8 @@ pub(crate) fn blocks(sightings: &[Sighting], frame: usize) -> impl Iterator<Item
     })
 }
 
-/// The medoid of poses: its median distance from the others is the least. A rotation counts by the displacement of a
-/// point at the distance of the translations.
+/// The medoid of the poses: the pose with the smallest median distance from the others. A rotation
+/// counts by the displacement of a point at the distance of the translations.
 pub(crate) fn middle(poses: &[Pose]) -> Pose {
     let arm = median(poses.iter().map(|pose| pose.translation.length()).collect())
         .unwrap_or(0.0)

@@ -8,11 +8,13 @@ use deltille_core::camera::{
     Camera, Lens, PROJECTION_PARAMETERS, Spline, SplineGrid, stereographic_direction,
 };
 
-/// Size of the grid relative to the outermost corner: a search moves it by less.
+/// Extent of the grid relative to the outermost corner. The optimisation moves that corner by less
+/// than the margin.
 const MARGIN: f64 = 1.02;
 
-/// Extent of the grid towards the image border, relative to the angle of the outermost corner. What lies beyond, such
-/// as the black rim of a fisheye, would take knots from where the corners are.
+/// Extent of the grid towards the image border, relative to the angle of the outermost corner.
+/// Areas beyond, for example the black rim of a fisheye image, would take knots from the area with
+/// corners.
 const BEYOND: f64 = 1.25;
 
 /// Default distance of knots in the image centre, as a fraction of the longer side: the deviations of lenses from their
@@ -25,12 +27,14 @@ const ALONG: usize = 32;
 /// Number of sample positions per knot at which the two lenses are matched.
 const A_KNOT: usize = 3;
 
-/// Weight of second differences relative to these positions: they count only where there are none.
+/// Weight of second differences relative to these positions. They matter only where there are no
+/// positions.
 const SMOOTH: f64 = 1e-9;
 
-/// Replaces the lens of a camera by a spline of a degree, with this number of knots (columns and rows) or as many as it
-/// takes. `seen` are the pixels of corners. The prior of the knots expects a lens of the same kind with free parameters
-/// `free`. `None` if the lens cannot image the pixels.
+/// Replaces the lens of a camera by a spline of a degree, with this number of knots (columns and
+/// rows), or with as many knots as the lens needs. `seen` are the pixels of corners. The prior of
+/// the knots expects a lens of the same kind with free parameters `free`. `None` if the lens cannot
+/// image the pixels.
 pub(super) fn splined(
     camera: &Camera,
     free: &[bool],
@@ -87,7 +91,7 @@ pub(super) fn splined(
     Some((Camera { lens: Lens::Spline(spline), ..camera.clone() }, roughness))
 }
 
-/// The largest |u| along both axes to cover.
+/// The largest |u| along both axes that the grid must cover.
 fn reach(camera: &Camera, seen: impl Iterator<Item = DVec2>) -> Option<DVec2> {
     let place = |pixel: DVec2| {
         let ray = camera.unproject(pixel)?.direction;

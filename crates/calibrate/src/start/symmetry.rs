@@ -1,19 +1,20 @@
 //! Labels of a board that looks the same after a rotation, so that the cameras of a rig may label its corners
 //! differently.
 //!
-//! The detector labels such a board by its orientation in the image. A camera that is upside down, or a board that lies
-//! on its side in one image, gives labels that differ by one of the rotations Sₖ of the board. Only with the right
-//! rotation is the pose of camera b in camera a the same in all frames,
+//! The detector labels a board like this by its orientation in the image. If a camera is upside
+//! down, or a board lies on its side in one image, the labels differ by one of the rotations Sₖ of
+//! the board. The pose of camera b in camera a is the same in all frames only with the right
+//! rotation,
 //!
 //! ```text
 //!     b_from_a = b_from_target · Sₖ⁻¹ · a_from_target⁻¹
 //! ```
 //!
-//! because any other makes it rotate with the board. In each frame, the poses for different k differ by 90° or more, so
-//! a frame is decided as soon as the pose is known roughly.
+//! because any other makes it rotate with the board. In each frame, the poses for different k
+//! differ by 90° or more, so the rotation in a frame is known as soon as the pose is known roughly.
 //!
-//! Limits: cameras are compared by a board that both see. A rotation of all cameras' labels in one frame changes only
-//! the pose of the board, which stays as in the first camera.
+//! Limitations: cameras are compared by a board that both see. A rotation of all cameras' labels in
+//! one frame changes only the pose of the board. It remains as labelled in the first camera.
 
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_4;
@@ -28,15 +29,15 @@ use deltille_core::camera::Pose;
 use deltille_core::lattice::{LatticeMap, Vertex};
 use deltille_core::statistics::median;
 
-/// Greatest number of frames whose poses are compared: more do not improve the decision.
+/// Maximum number of frames whose poses are compared; more frames do not improve the decision.
 const MAX_FRAMES: usize = 60;
 
 /// Factor by which poses must scatter more with the detected labels before these are changed. The pose from a single
-/// frame may scatter two to three times as much as that from other frames, and poses with wrong labels scatter as far
-/// as the board was tilted.
+/// frame may scatter two to three times as much as that from other frames, and poses with wrong
+/// labels scatter by the range of tilts of the board.
 const DECISIVE: f64 = 3.0;
 
-/// Half of the least difference between rotations of a board, 90°, which separates them.
+/// Half of the smallest difference between rotations of a board, 90°. It separates these rotations.
 const OTHER_RAD: f64 = FRAC_PI_4;
 
 /// The rotation of the labels of a camera.
@@ -63,12 +64,13 @@ pub(super) struct Symmetries {
 /// A rotation of the labels of a target, and its effect on the pose of a view.
 struct Symmetry {
     map: LatticeMap,
-    /// From the target with its labels rotated to the target as it was labelled.
+    /// The pose that maps the target with rotated labels to the target as it was labelled.
     labelled_from_rotated: Pose,
 }
 
 impl Symmetries {
-    /// The symmetries of targets of one panel; tags decide for several panels.
+    /// The symmetries of targets of one panel. Targets of several panels have none, because their
+    /// tags are unique.
     pub(super) fn of(calibration: &Calibration) -> Self {
         let mut places = vec![BTreeMap::new(); calibration.targets.len()];
         let of_target = calibration.targets.iter().enumerate().map(|(target, of)| {
@@ -123,8 +125,9 @@ impl Symmetries {
         relabelled.collect()
     }
 
-    /// Rotates the labels of all cameras except the first so that the cameras agree, from camera to camera along those
-    /// that share the most frames. Returns the rotation to report for each camera.
+    /// Rotates the labels of all cameras except the first so that the cameras agree. It proceeds
+    /// from camera to camera, along the pairs that share the most frames. Returns the rotation to
+    /// report for each camera.
     pub(super) fn agree(
         &self,
         calibration: &Calibration,
@@ -187,8 +190,8 @@ impl Symmetries {
         relative.collect()
     }
 
-    /// Rotates the labels of a camera with this pose on the rig to those of the placed cameras. Returns the number of
-    /// rotated frames and of all frames.
+    /// Rotates the labels of a camera with this pose on the rig to match those of the located
+    /// cameras. Returns the number of rotated frames and of all frames.
     fn rotate(
         &self,
         seen: &mut ByFrame,
@@ -201,7 +204,7 @@ impl Symmetries {
         for (name, of_frame) in &mut own {
             let (mut is_rotated, mut is_shared) = (false, false);
             for view in of_frame {
-                // The view with the most corners has the best pose.
+                // The view with the most corners has the most accurate pose.
                 let others = placed.iter().flat_map(|(camera, from_rig)| {
                     let of_camera = seen[*camera].get(name).into_iter().flatten();
                     of_camera.map(move |seen| (from_rig, seen))
@@ -270,7 +273,8 @@ fn apart_mm(a: &Pose, b: &Pose, arm_mm: f64) -> f64 {
 }
 
 /// Finds the pose on which most frames agree. Each frame has the pose with the detected labels and those with rotated
-/// labels; the detected labels win unless others agree decisively better. `None` without frames.
+/// labels; the detected labels are kept unless others agree decisively better. `None` without
+/// frames.
 pub(super) fn agreed(frames: &[Vec<Pose>]) -> Option<Agreed> {
     let frames: Vec<&Vec<Pose>> = evenly(frames, MAX_FRAMES).collect();
     let labelled = || frames.iter().filter_map(|poses| poses.first());

@@ -1,12 +1,12 @@
-//! The start of several cameras, or of one camera with unknown panel poses: each camera is solved on its own, and the
-//! results are combined.
+//! The start of several cameras, or of one camera with unknown panel poses: each camera is solved
+//! separately, and the results are combined.
 //!
 //! ```text
-//!   each camera on its own ─→ camera_from_target in its own views
+//!   each camera separately ─→ camera_from_target in its own views
 //!   images of all cameras ─→ lag of each camera in frames
 //!   two cameras, one frame ─→ camera_from_camera: the medoid over all such frames
-//!   a camera and a target of its own ─→ both, from the motion of the rig
-//!   from camera 0 on to all others ─→ camera_from_rig, scene_from_target, rig_from_scene(frame)
+//!   a camera and a target that only it sees ─→ both, from the motion of the rig
+//!   from camera 0 to all others ─→ camera_from_rig, scene_from_target, rig_from_scene(frame)
 //! ```
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,7 +28,7 @@ use crate::problem::unknowns::{Block, CameraUnknowns};
 use crate::problem::whitening::scale;
 use deltille_core::camera::{Camera, Pose};
 
-/// The result of a camera on its own.
+/// The separate result of a camera.
 pub(crate) struct Alone {
     pub camera: Camera,
     /// The prior of the knots of a spline.
@@ -100,7 +100,7 @@ pub(crate) fn start(
     problem.cameras = of_cameras.map(unknown).collect();
     problem.targets = targets_unknown(&blocks, calibration, &places.scene_from_target);
     problem.panels = unknowns(&blocks, calibration);
-    // A corner that the camera cannot image from this start cannot be reached by steps.
+    // If the camera cannot image a corner at these initial values, no step can reach it.
     blocks.retain(|block| problem.residuals(block).is_some());
     problem.blocks = blocks;
     // A first pass in which frames that were not taken at the same time have almost no influence.
@@ -110,7 +110,7 @@ pub(crate) fn start(
     Ok(Start { problem: first.problem, frames, excluded, delays, rotations })
 }
 
-/// The frames by their names, whose poses are added to the problem.
+/// The frames by name. Adds their poses to the problem.
 fn frames(seen: &ByFrame, places: &Places, problem: &mut Problem) -> Vec<Frame> {
     let names: BTreeSet<&str> =
         seen.iter().flat_map(|of_camera| of_camera.keys().map(String::as_str)).collect();
@@ -131,7 +131,7 @@ fn frames(seen: &ByFrame, places: &Places, problem: &mut Problem) -> Vec<Frame> 
     frames
 }
 
-/// The result of a camera on its own: given, or estimated from its views.
+/// The separate result of a camera: given, or estimated from its views.
 fn alone(
     calibration: &Calibration,
     index: usize,
@@ -148,7 +148,7 @@ fn alone(
     })
 }
 
-/// The views of a camera by frame, with the poses from the camera on its own.
+/// The views of a camera by frame, with the poses from its separate result.
 fn by_frame(
     calibration: &Calibration,
     camera: &CameraViews,

@@ -2,8 +2,8 @@
 //!
 //! Standard deviations from the noise of corners assume an exact model of cameras and target. Model errors, such as a
 //! board that is not quite flat, bias the estimate differently in every frame. So the gradient of each frame counts as
-//! one sample, and the scatter of all gives the cluster-robust covariance with the correction CR2, which equals that
-//! from noise if there are no model errors (Bell & McCaffrey 2002).
+//! one sample, and the scatter of all gives the cluster-robust covariance with the correction CR2,
+//! which equals the covariance from noise if there are no model errors (Bell & McCaffrey 2002).
 //!
 //! ```text
 //!     yᵥ = (I − LᵀHᵥL)^−½ Lᵀ gᵥ,    Σ = LLᵀ       Hᵥ, gᵥ: normal equations and gradient of frame v
@@ -13,10 +13,11 @@
 //! Priors, on the knots of a spline and on the offsets of corners, do not come from any frame: with P their part of the
 //! normal equations, frames scatter only as I − LᵀPL, and LᵀPL is added with its nominal size.
 //!
-//! Errors that all frames have in common do not show in the scatter: see [`super::board_errors`].
+//! Errors that all frames have in common do not appear in the scatter; see [`super::board_errors`].
 //!
-//! F frames determine at most F − 1 directions, and each only roughly; so S is shrunk towards a multiple of the
-//! covariance from noise, as far as its own scatter calls for (Ledoit & Wolf 2004).
+//! F frames determine at most F − 1 directions, and each only roughly; so S is shrunk towards a
+//! multiple of the covariance from noise, by an amount that depends on its own scatter (Ledoit &
+//! Wolf 2004).
 
 use nalgebra::{DMatrix, DVector, Matrix6};
 use rayon::prelude::*;
@@ -30,10 +31,12 @@ use crate::input::loss::Loss;
 use crate::problem::corner_map::CornerMap;
 use crate::problem::whitening::Whitening;
 
-/// Least number of frames for an empirical covariance: a calibration remains without one of them.
+/// Minimum number of frames for an empirical covariance: a calibration is still possible without
+/// one of them.
 const MIN_FRAMES: usize = 4;
 
-/// Greatest leverage of one frame on a direction that is corrected for: beyond it no other frame tests the direction.
+/// Maximum leverage of one frame on a direction for which a correction is made. Beyond it, no other
+/// frame tests the direction.
 const MAX_OF_ONE: f64 = 0.9;
 
 /// An empirical covariance.
@@ -46,7 +49,8 @@ pub(crate) struct Observed {
 }
 
 impl Observed {
-    /// Adds the covariance from errors of the board, and from the attraction (`drawn`) of a measured board to its plan.
+    /// Adds the covariance from errors of the board, and from the bias (`drawn`) of a measured
+    /// board towards its plan.
     pub(crate) fn with(self, of_board: Option<DMatrix<f64>>, drawn: Option<&DMatrix<f64>>) -> Self {
         let mut covariance = self.covariance;
         covariance = of_board.iter().fold(covariance, |sum, of_board| sum + of_board);
@@ -83,14 +87,14 @@ pub(crate) fn observed(
         }
     };
     let mut pulls = DMatrix::from_columns(&columns);
-    // At the minimum they sum to zero; the remainder of the minimisation is not scatter.
+    // At the minimum, they sum to zero. The remaining error of the minimisation is not scatter.
     let mean = pulls.column_mean();
     pulls.column_iter_mut().for_each(|mut pull| pull -= &mean);
     let count = frames as f64;
     let expected = expected(minimum, whitening, found);
     let (scatter, share) = shrunk(&pulls, expected.as_ref());
     let mut scatter = scatter * (count / (count - 1.0));
-    // The common level is known from all directions together.
+    // The common scale is determined from all directions together.
     let mut directions = minimum.layout.shared as f64;
     if let Some(expected) = expected {
         directions -= expected.trace();
@@ -191,18 +195,20 @@ fn pull_of(
     pull.iter().all(|v| v.is_finite()).then_some(pull)
 }
 
-/// The same if corners are unknowns too: their offsets adapt to each frame, and the leverage of a frame on lens and
-/// offsets together is large in few directions. With H all normal equations, Hᵥ those of the frame over the shared
-/// unknowns and the offsets, and M = H^−½ Hᵥ H^−½,
+/// The same if corners are unknowns too: their offsets adapt to each frame, and the leverage of a
+/// frame on lens and offsets together is large in only a few directions. With H all normal
+/// equations, Hᵥ those of the frame over the shared unknowns and the offsets, and M = H^−½ Hᵥ H^−½,
 ///
 /// ```text
 ///     y = f(M) H^−½ gᵥ,    f(p) = 1 / (1 − p)        the jackknife (CR3), linearised
 /// ```
 ///
-/// by Lanczos' method. It is the more cautious choice: on halves of robot-hand, observed over expected differences were
-/// 0.94 to 1.09 with the exponent 3/4, and 0.77 to 0.88 with 1. CR2 (1/2) was not tried there.
+/// by Lanczos' method. It is the more conservative choice: on halves of the robot-hand data set,
+/// observed over expected differences were 0.94 to 1.09 with the exponent 3/4, and 0.77 to 0.88
+/// with 1. CR2 (1/2) was not tried there.
 ///
-/// The equations are solved for several frames at once: one by one, they would be read from memory as often.
+/// The equations are solved for several frames at once, because otherwise they would be read from
+/// memory once per frame.
 fn with_leverage(
     minimum: &Minimum,
     whitening: &Whitening,
@@ -246,14 +252,16 @@ fn with_leverage(
 /// Number of frames whose leverage is resolved at the same time.
 const FRAMES_AT_A_TIME: usize = 32;
 
-/// Lanczos' method for one frame: right sides that are orthonormal with respect to H⁻¹, and their products with H⁻¹.
+/// Lanczos' method for one frame: right-hand sides that are orthonormal with respect to H⁻¹, and
+/// their products with H⁻¹.
 struct Lanczos {
     own: OfFrame,
     basis: Vec<DVector<f64>>,
     solutions: Vec<DVector<f64>>,
-    /// The next right side.
+    /// The next right-hand side.
     next: DVector<f64>,
-    /// The tridiagonal matrix: its diagonal, and its off-diagonal, the norms of right sides starting with the gradient.
+    /// The tridiagonal matrix: its diagonal, and its off-diagonal, the norms of right-hand sides
+    /// starting with the gradient.
     along: Vec<f64>,
     sizes: Vec<f64>,
 }
@@ -265,13 +273,13 @@ impl Lanczos {
         Self { own, basis, solutions, next, along, sizes }
     }
 
-    /// Whether the next right side is significant.
+    /// Whether the next right-hand side is significant.
     fn goes_on(&self) -> bool {
         let left: f64 = self.sizes.iter().skip(1).product();
         self.sizes.len() <= MAX_DIRECTIONS && left > LEFT && self.sizes.last() != Some(&0.0)
     }
 
-    /// Accepts the solution for the next right side, and forms the one after it.
+    /// Accepts the solution for the next right-hand side, and forms the one after it.
     fn advance(&mut self, solution: DVector<f64>) {
         let size = self.next.dot(&solution).max(0.0).sqrt();
         self.sizes.push(size);
@@ -310,10 +318,11 @@ impl Lanczos {
     }
 }
 
-/// Greatest negligible remainder beyond the directions found so far, relative to the whole.
+/// Maximum negligible remainder beyond the directions found so far, relative to the whole.
 const LEFT: f64 = 1e-4;
 
-/// Most directions in which the leverage of a frame is resolved: those of large leverage come first.
+/// Maximum number of directions in which the leverage of a frame is resolved; directions of large
+/// leverage come first.
 const MAX_DIRECTIONS: usize = 40;
 
 /// The same for a frame that touches only some of the unknowns.
@@ -327,7 +336,7 @@ fn by_some(own: &DMatrix<f64>, pull: &DVector<f64>, found: &Covariances) -> Opti
 
 /// The sum of x xᵀ over the columns, shrunk towards a multiple of the identity (Ledoit & Wolf
 /// 2004), and the degree of shrinkage from 0 to 1; with a prior (`expected`), towards a multiple of
-/// the identity less that.
+/// the identity minus the prior.
 fn shrunk(columns: &DMatrix<f64>, expected: Option<&DMatrix<f64>>) -> (DMatrix<f64>, f64) {
     let (n, count) = (columns.nrows() as f64, columns.ncols() as f64);
     let columns = columns * count.sqrt();

@@ -24,18 +24,21 @@ use crate::problem::corner_map::CornerMap;
 use crate::problem::whitening::Whitening;
 
 /// Standard deviation of a corner of a printed board, mm. Office printers stretch a sheet by 0.05 to 0.2 %, by
-/// different amounts across and along the feed: 0.05 to 0.2 mm at 100 mm from the centre. The sheet of the robot-hand
-/// photographs (20 mm edges, 200 mm across) is off by 0.07 mm per axis.
+/// different amounts across and along the feed: 0.05 to 0.2 mm at 100 mm from the centre. The
+/// corners of the sheet in the robot-hand data set (20 mm edges, 200 mm across) are off by 0.07 mm
+/// per axis.
 const PRINTED_MM: f64 = 0.1;
 
-/// Limit of the same in edges, for small boards, which office printers do not make.
+/// Upper limit of the same standard deviation in edges, for small boards, which are not made on
+/// office printers.
 const PRINTED_EDGES: f64 = 0.005;
 
 /// Number of frames whose equations are in memory at the same time.
 const FRAMES_AT_A_TIME: usize = 64;
 
 /// The covariance of the shared unknowns from errors of the board; `accuracy_mm` is the standard deviation of a corner
-/// per axis, `None` for that of a printed board. `None` if the corners are unknowns themselves, or exact.
+/// per axis, or `None` for a printed board. Returns `None` if the corners are unknowns themselves,
+/// or exact.
 pub(crate) fn board_errors(
     minimum: &Minimum,
     whitening: &Whitening,
@@ -83,11 +86,12 @@ fn accuracy(map: &CornerMap, given_mm: Option<f64>) -> Option<f64> {
 /// Errors of the shared unknowns and the offsets of corners, in this order, if the corners are estimated too: columns
 /// whose outer products sum to the covariance.
 ///
-/// The prior of the offsets is white, and draws a sheet that is distorted as a whole towards its plan if the views do
-/// not determine it: with P the part of the prior in the normal equations H, by X a = H⁻¹ P M a. The columns of M are
-/// modes in which a sheet differs from its plan, one standard deviation of a printed sheet each, and a is the amount of
-/// each mode. With many views this is negligible, with four views it is most of the error. The views determine a, from
-/// the estimated offsets b, as
+/// The prior of the offsets is white. If the views do not determine a sheet that is distorted as a
+/// whole, the prior pulls it towards its plan by X a = H⁻¹ P M a. P is the part of the prior in the
+/// normal equations H. The columns of M are modes in which a sheet differs from its plan, each with
+/// the size of one standard deviation of a printed sheet. The vector a contains the amount of each
+/// mode. With many views this bias is negligible; with four views it is most of the error. From the
+/// estimated offsets b, the views determine a as
 ///
 /// ```text
 ///     C = (1 + Mᵀ P M − Mᵀ P X)⁻¹,    mean C Mᵀ P b
@@ -103,7 +107,7 @@ pub(crate) fn drawn_to_plan(
     let Minimum { problem, normal, layout, .. } = minimum;
     let map = problem.map.as_ref()?;
     let accuracy_mm = accuracy(map, accuracy_mm)?;
-    // A scale is not measured: distances absorb it.
+    // Scale is not measured, because distances absorb it.
     let sheets = sheets(map, &SHEET[1..]);
     // P M; the normal equations contain it times the square of sigma.
     let pulls = DMatrix::from_fn(sheets.nrows(), sheets.ncols(), |i, mode| {
@@ -126,7 +130,8 @@ pub(crate) fn drawn_to_plan(
     Some(off * root)
 }
 
-/// Displacements of a sheet as a function of the position from its centre: scaled, stretched, sheared, and bent.
+/// Displacements of a sheet as a function of the position relative to its centre: scaled,
+/// stretched, sheared, and bent.
 const SHEET: [fn(DVec3) -> DVec3; 6] = [
     |at| DVec3::new(at.x, at.y, 0.0),
     |at| DVec3::new(at.x, -at.y, 0.0),
@@ -136,8 +141,9 @@ const SHEET: [fn(DVec3) -> DVec3; 6] = [
     |at| DVec3::new(0.0, 0.0, at.y * at.y),
 ];
 
-/// Offsets of all corners, one column for each mode in which the sheet of a panel differs from its plan. The modes in
-/// the plane have together a mean square of 1 per axis, those out of it likewise.
+/// Offsets of all corners, one column for each mode in which the sheet of a panel differs from its
+/// plan. The modes in the plane together have a mean square of 1 per axis; so do those out of the
+/// plane.
 fn sheets(map: &CornerMap, fields: &[fn(DVec3) -> DVec3]) -> DMatrix<f64> {
     let mut columns = Vec::new();
     let mut first = 0;

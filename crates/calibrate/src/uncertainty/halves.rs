@@ -1,9 +1,10 @@
-//! Raises the observed covariance to what halves of the views show.
+//! Increases the observed covariance if two halves of the views differ by more than it predicts.
 //!
-//! The scatter of single views averages out slow or single changes: each view differs little from its neighbours. Two
-//! halves of the views (the first and the last, or the odd and the even ones) then differ by δ, and the camera from all
-//! views differs by half of that from either. If δ is significantly larger than the observed covariance predicts, δδᵀ/4
-//! is added: the variance of a mean of two, estimated from the two.
+//! The scatter of single views underestimates slow or single changes, because each view differs
+//! little from its neighbours. Let two halves of the views (first and last half, or odd and even
+//! views) differ by δ. The camera from all views differs by δ/2 from either. If δ is significantly
+//! larger than the observed covariance predicts, δδᵀ/4 is added: the variance of a mean of two,
+//! estimated from the two.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -11,16 +12,17 @@ use super::state_equations::{Candidate, StateEquations, significance};
 use deltille_core::camera::Camera;
 use deltille_core::statistics::f_p_value;
 
-/// Probability that a correct covariance is raised, for all parameters and both splits together.
+/// Probability that a correct covariance is increased, for all parameters and both splits together.
 const SIGNIFICANT: f64 = 0.01;
 
 /// Number of splits of the views.
 const WAYS: usize = 2;
 
-/// Least number of views in a half.
+/// Minimum number of views in a half.
 const MIN_VIEWS: usize = 5;
 
-/// The covariance of a camera's parameters, raised if the halves call for it. `noise` is the covariance from noise.
+/// The covariance of a camera's parameters, increased if the halves differ significantly. `noise`
+/// is the covariance from noise.
 pub(crate) fn raised(
     equations: &StateEquations,
     camera: &Camera,
@@ -34,13 +36,13 @@ pub(crate) fn raised(
     }
     let limit = SIGNIFICANT / (WAYS * (n + 1)) as f64;
     let ways: [&dyn Fn(usize) -> bool; WAYS] = [&|view| 2 * view < count, &|view| view % 2 == 0];
-    // All parameters, separately for each half.
+    // Fits all parameters separately for each half.
     let apart = ways.iter().filter_map(|is_first| {
         let first = equations.some(is_first).fit(&equations.camera())?;
         let second = equations.some(|view| !is_first(view)).fit(&equations.camera())?;
         let off: DVector<f64> = first.values() - second.values();
-        // Standard deviation of a half difference: the observed one, scaled by the ratio that noise predicts for
-        // halves.
+        // Standard deviation of half the difference: the observed standard deviation, scaled by the
+        // ratio that noise predicts for halves.
         let of_halves = |i: usize| {
             let half = first.noise_variance(i) + second.noise_variance(i);
             (observed[(i, i)] * half / noise[(i, i)]).sqrt()
@@ -49,7 +51,8 @@ pub(crate) fn raised(
             |i: usize| f_p_value((off[i] / of_halves(i)).powi(2), 1.0, (count - 2) as f64);
         ((0..n).map(p_value).fold(1.0, f64::min) < limit).then_some(off)
     });
-    // The focal lengths alone: with one common lens, halves that show the board differently determine them better.
+    // Fits the focal lengths alone. With one common lens, halves that show the board differently
+    // determine them better.
     let focal = ways.iter().filter(|_| equations.is_focal_free()).filter_map(|is_first| {
         let mut columns = equations.camera();
         let weights = (0..count).map(|view| f64::from(u8::from(is_first(view)))).collect();

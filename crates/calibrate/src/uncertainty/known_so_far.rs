@@ -1,4 +1,5 @@
-//! The information of the corners on the first camera and the board, from which views are proposed.
+//! The information of the corners about the first camera and the board. It is the basis of proposed
+//! views.
 
 use nalgebra::DMatrix;
 
@@ -7,7 +8,7 @@ use crate::equations::covariances::Covariances;
 use crate::problem::shape::COUNT as SHAPE_COEFFICIENTS;
 use deltille_core::statistics::median;
 
-/// The information on the unknowns of one camera and on the shape of the board.
+/// The information about the unknowns of one camera and about the shape of the board.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct KnownSoFar {
     /// Inverse covariance of the estimated parameters, then of the shape.
@@ -16,7 +17,8 @@ pub(crate) struct KnownSoFar {
     pub corner_variance_px2: f64,
 }
 
-/// The information on the first camera and the board's shape, after elimination of all other shared unknowns.
+/// The information about the first camera and the board's shape, after elimination of all other
+/// shared unknowns.
 pub(crate) fn known_so_far(
     settled: &Settled,
     found: &Covariances,

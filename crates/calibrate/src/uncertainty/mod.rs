@@ -6,8 +6,9 @@
 //!    board.
 //! 2. `state_equations` forms equations of each view for changes of the camera, a rolling shutter and a stretched
 //!    board.
-//! 3. `halves` raises the covariance if halves of the views differ by more.
-//! 4. `projection` is the uncertainty of projections; `known_so_far` the information from which views are proposed.
+//! 3. `halves` increases the covariance if two halves of the views differ by more than it predicts.
+//! 4. `projection` is the uncertainty of projections; `known_so_far` is the information on which
+//!    proposals of views are based.
 
 pub(crate) mod agreement;
 pub(crate) mod board_errors;

@@ -1,8 +1,9 @@
 //! The uncertainty of projections of a camera.
 //!
-//! Parameters alone do not give it: a principal point that is off by one pixel is compensated by a slightly rotated
-//! camera, and no image distinguishes the two. So a change of the parameters is combined with the motion of the camera
-//! that best explains the detected corners, as in the cross-reprojection uncertainty of mrcal 3.0
+//! The covariance of the parameters alone does not give it: a slight rotation of the camera
+//! compensates for a principal point that is off by one pixel, and no image distinguishes the two.
+//! So a change of the parameters is combined with the motion of the camera that best explains the
+//! detected corners, as in the cross-reprojection uncertainty of mrcal 3.0
 //! (<https://mrcal.secretsauce.net/docs-3.0/uncertainty-cross-reprojection.html>):
 //!
 //! ```text
@@ -27,8 +28,8 @@ use deltille_core::statistics::median;
 pub struct ProjectionUncertainty {
     /// K: the motion of the scene (ω in rad, τ in mm) per change of each estimated parameter.
     pub alignment: Matrix,
-    /// Distances for which it is reported in addition to infinity, mm: the requested ones, else the median distance of
-    /// the corners.
+    /// Distances for which it is reported in addition to infinity, mm: the requested ones, or by
+    /// default the median distance of the corners.
     pub distances_mm: Vec<f64>,
     /// Observed covariance of the estimated parameters, from the scatter between frames; `None` with too few frames.
     pub observed: Option<ObservedCovariance>,
@@ -61,8 +62,8 @@ impl ObservedCovariance {
 pub enum Source {
     /// The noise of the corners, for an exact model of camera and target.
     Noise,
-    /// The scatter between frames, whatever its cause, and the effect of errors of the board, which all frames have in
-    /// common.
+    /// The scatter between frames, from any cause, and the effect of errors of the board, which all
+    /// frames have in common.
     Observed,
 }
 

@@ -1,13 +1,15 @@
-//! Linear equations of each view for the camera and for changes that a calibration does not model.
+//! Linear equations of each view for the camera parameters and for changes that a calibration does
+//! not model.
 //!
 //! ```text
 //!   rows of a view:    residual = [ camera | candidates | pose ] · unknowns        whitened, weighted by the loss
 //!   Gram matrix:       [ camera | candidates | residual ]ᵀ[ … ], the pose of the view eliminated
 //! ```
 //!
-//! The candidates are quantities that may differ between views (focal length, principal point), displacements by a
-//! rolling shutter while the board moves, and stretch and bend of the board. With these matrices any combination of
-//! columns is fitted by one Gauss–Newton step (a score test), without another bundle adjustment.
+//! The candidates are quantities that may differ between views (focal length, principal point),
+//! displacements due to a rolling shutter while the board moves, and stretch and bend of the board.
+//! With these matrices any combination of columns is fitted by one Gauss–Newton step (a score
+//! test), without another bundle adjustment.
 
 use std::collections::BTreeSet;
 
@@ -70,7 +72,7 @@ pub(crate) struct ViewEquations {
     pub frame: usize,
     /// Gram matrix of the camera's columns, the candidates and the residual.
     gram: DMatrix<f64>,
-    /// Number of coordinates less the unknowns of the pose.
+    /// Number of coordinates minus the number of unknowns of the pose.
     pub freedom: f64,
     /// Size of a whitened coordinate, px.
     px: f64,
@@ -141,7 +143,8 @@ impl StateEquations {
         if free.is_empty() {
             return None;
         }
-        // A spline is rigid here: all views determine its knots far better than differences of two groups.
+        // A spline is treated as fixed: all views together determine its knots far better than the
+        // differences between two groups of views do.
         let free = if matches!(unknowns.camera.lens, Lens::Spline(_)) { Vec::new() } else { free };
         let of_camera = || problem.blocks.iter().filter(|block| block.camera == camera);
         let panels: BTreeSet<usize> = of_camera().map(|block| block.panel.index()).collect();
@@ -173,13 +176,14 @@ impl StateEquations {
         self.free.len()
     }
 
-    /// Whether the first two of them are the focal lengths.
+    /// Whether the first two unknowns of the camera are the focal lengths.
     pub(super) fn is_focal_free(&self) -> bool {
         self.free.starts_with(&[0, 1])
     }
 
-    /// The change of a parameter in a fit whose first columns are those of the camera, px; for a rigid camera, that of
-    /// the candidate in its place, whose unit is `px` pixels.
+    /// The change of a parameter in a fit whose first columns are those of the camera, px. For a
+    /// camera without free parameters, it is the change of the corresponding candidate, whose unit
+    /// is `px` pixels.
     pub(crate) fn change_px(
         &self,
         fit: &Fit,
@@ -219,7 +223,7 @@ impl StateEquations {
         self.fit_with_each(columns, &[])
     }
 
-    /// Fits some columns and candidates with a separate value in every view.
+    /// Fits some columns, and candidates that have a separate value in every view.
     pub(crate) fn fit_with_each(&self, columns: &[Column], each: &[Candidate]) -> Option<Fit> {
         let m = columns.len();
         let mut parts = Vec::with_capacity(self.views.len());
@@ -241,7 +245,8 @@ impl StateEquations {
         Some(Fit { beta, inverse, parts, whole, right, left, freedom })
     }
 
-    /// The values of the candidates in each view of such a fit, and the reduction of its sum of squares.
+    /// The values of the candidates in each view of a fit by [`Self::fit_with_each`], and the
+    /// reduction of its sum of squares.
     pub(crate) fn each(
         &self,
         columns: &[Column],
@@ -300,8 +305,9 @@ impl Fit {
     /// An unknown with its standard deviation. The variance is the mean of that of the delete-one jackknife over views
     /// and of that from noise scaled by the excess scatter of views in all directions, but at least that from noise.
     ///
-    /// The degrees of freedom of the jackknife follow from Satterthwaite's formula for the contributions of views, less
-    /// `taken`; the mean has twice as many, as all directions together determine the other variance.
+    /// The degrees of freedom of the jackknife follow from Satterthwaite's formula for the
+    /// contributions of views, minus `taken`. The mean has twice as many, because all directions
+    /// together determine the other variance.
     pub(crate) fn effect(&self, index: usize, taken: f64) -> Option<Effect> {
         let count = self.parts.len() as f64;
         let (mut without, mut shares) = (Vec::with_capacity(self.parts.len()), Vec::new());
@@ -346,7 +352,8 @@ impl Fit {
     }
 }
 
-/// Least information of a view on a direction, relative to that on its coordinates, for the view to determine it.
+/// Minimum information of a view about a direction, relative to the information about its
+/// coordinates, at which the view determines the direction.
 const OPEN: f64 = 1e-6;
 
 struct Equations<'a> {
@@ -385,7 +392,7 @@ impl Equations<'_> {
                 }
                 let whitened = Whitening::apply(w, residual);
                 let (_, weight) = loss.of(whitened.length_squared(), whitening.sigma);
-                // The rows in the image centre are read at the nominal time of the view.
+                // The central row of the image is read at the nominal time of the view.
                 let ramp = (seen.pixel.y + 0.5) / height - 0.5;
                 let by_point = at.by_point.map(DVec3::from);
                 let by_place = by_point.map(|by| panel_from_camera * by);
@@ -435,8 +442,8 @@ impl Equations<'_> {
 }
 
 /// Derivatives of a coordinate with respect to stretch, shear and bend of the sheet, in the order of
-/// [`Candidate::SHEET`]. `by_place` is the derivative with respect to the corner's position; `uv` is its position from
-/// the centre of the sheet in units of `reach`, mm.
+/// [`Candidate::SHEET`]. `by_place` is the derivative with respect to the corner's position; `uv`
+/// is its position relative to the centre of the sheet, in units of `reach`, mm.
 fn by_sheet(uv: DVec3, by_place: DVec3, reach: f64) -> [f64; 5] {
     [
         reach * (uv.x * by_place.x - uv.y * by_place.y),
@@ -478,5 +485,5 @@ fn inverted(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
 }
 
-/// Term added to a diagonal of 1: directions with less information stay unchanged.
+/// Term added to a diagonal of 1, so that directions with less information remain unchanged.
 const SINGULAR: f64 = 1e-11;

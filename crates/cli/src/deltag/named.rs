@@ -35,7 +35,7 @@ pub fn resolve(name_or_path: &str) -> anyhow::Result<Family> {
         && let Some(failure) = certify_codes(&family).failures.first()
     {
         let file = Path::new(name_or_path).display();
-        log!("warning: {file} contradicts its own claims: {failure}");
+        log!("warning: {file} does not have the properties that it states: {failure}");
     }
     Ok(family)
 }

@@ -34,7 +34,7 @@ use deltille::targets::SolidShape;
 
 pub use self::make::BoardSettings;
 
-/// Make, detect and verify deltille targets.
+/// Make, verify and detect calibration targets, and calibrate cameras.
 #[derive(Parser)]
 #[command(name = "deltille", version, arg_required_else_help = false)]
 pub struct Deltille {
@@ -103,7 +103,7 @@ enum Command {
     /// Refine given corner positions
     #[command(after_help = examples::REFINE)]
     Refine(refine::Args),
-    /// Propose the next photograph of a target to take, until the camera is known well enough
+    /// Propose the next view of the target, until the camera is calibrated accurately enough
     #[command(after_help = examples::GUIDE)]
     Guide(Box<guide::Args>),
     /// Calibrate a camera from detected corners

@@ -11,14 +11,14 @@ const MIN_FORWARD: f64 = 0.002;
 /// distance over which any usable polynomial folds back.
 const RADIUS_STEP: f64 = 0.02;
 
-/// Largest exponent of image growth. No polynomial here grows with more than the seventh power of r; a lens does only
-/// where its denominator approaches zero.
+/// Largest exponent of image growth. No polynomial here grows faster than r⁷. A rational lens does
+/// so only where its denominator approaches zero.
 const STEEPEST: f64 = 7.0;
 
-/// Newton iterations from a start within [`RADIUS_STEP`]; five reach the last bit.
+/// Newton iterations from a start within [`RADIUS_STEP`]; five give full precision.
 const ITERATIONS: usize = 20;
 
-/// Perspective with radial, tangential and thin-prism distortion (Brown 1966, Conrady 1919), as in OpenCV:
+/// Perspective with radial, tangential and thin-prism distortion (Brown 1966, Conrady 1919), as in
 /// OpenCV:
 ///
 /// ```text
@@ -28,11 +28,13 @@ const ITERATIONS: usize = 20;
 ///     y' = y ρ + p1 (r² + 2y²) + 2 p2 xy + s3 r² + s4 r⁴
 /// ```
 ///
-/// Valid less than 89.9° from the axis, if ρ is positive and r ρ increases with r. Parameters are in OpenCV's order:
+/// Valid at angles below 89.9° from the axis where ρ is positive and r ρ increases with r.
+/// Parameters are in OpenCV's order:
 /// k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4.
 ///
-/// A denominator has more freedom than lenses need. A calibration often gives it a zero within the image, with a zero
-/// of the numerator so close that they cancel except in a ring far narrower than a pixel. Only the ring is invalid.
+/// The denominator has more freedom than lenses need. After a calibration, it often has a zero
+/// within the image. A zero of the numerator next to it cancels it, except in a ring far narrower
+/// than a pixel. Only the ring is invalid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BrownConrady {
     /// Radial coefficients k1, k2, k3 of the numerator.

@@ -23,7 +23,7 @@ pub struct DoubleSphere {
 }
 
 impl Default for DoubleSphere {
-    /// Returns the stereographic lens, which is close to fisheyes of all kinds.
+    /// Returns the stereographic projection, which approximates fisheye lenses of all kinds.
     fn default() -> Self {
         Self { xi: 0.0, alpha: 0.5 }
     }

@@ -57,7 +57,7 @@ pub(super) fn monotonic_radius(k: &[f64]) -> Option<f64> {
     Some(radius(k, turn.sqrt()).0)
 }
 
-/// Angle of a point and its derivatives by position.
+/// Angle of a point and its derivatives with respect to the position.
 pub(super) struct Angle {
     pub theta: f64,
     /// Derivative ∂θ/∂R, with R = ‖(X, Y)‖.

@@ -20,7 +20,7 @@ pub struct ExtendedUnified {
 }
 
 impl Default for ExtendedUnified {
-    /// Returns the stereographic lens, which is close to fisheyes of all kinds.
+    /// Returns the stereographic projection, which approximates fisheye lenses of all kinds.
     fn default() -> Self {
         Self { alpha: 0.5, beta: 1.0 }
     }
@@ -71,7 +71,8 @@ impl LensLaw for ExtendedUnified {
     }
 }
 
-/// Returns w: beyond it, two points on the line of a ray would have one image.
+/// Returns w, which limits the domain. Beyond the limit, two points on the line of a ray would
+/// share an image.
 pub(super) fn limit(alpha: f64) -> f64 {
     if alpha <= 0.5 { alpha / (1.0 - alpha) } else { (1.0 - alpha) / alpha }
 }
@@ -85,7 +86,7 @@ pub(super) fn quotient(point: DVec3, h: f64, h_point: [f64; 3]) -> Option<Imaged
     (h > 0.0).then_some(Imaged { at, by_point })
 }
 
-/// Returns the derivatives of (X, Y)/h by a parameter, from that of h.
+/// Returns the derivatives of (X, Y)/h with respect to a parameter, from the derivative of h.
 pub(super) fn by_height(point: DVec3, h: f64, h_parameter: f64) -> [f64; 2] {
     [-point.x * h_parameter / (h * h), -point.y * h_parameter / (h * h)]
 }

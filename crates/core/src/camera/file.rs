@@ -1,5 +1,5 @@
-//! Camera files: the project's own YAML (or JSON), which supports every model, and those of ROS and OpenCV, which can
-//! be read.
+//! Camera files. The project's own YAML (or JSON) format supports every model. Files of ROS and
+//! OpenCV can be read too.
 //!
 //! ```
 //! let text = "
@@ -40,8 +40,8 @@ use crate::reading::in_words;
 use super::kannala_brandt::MIN_TERMS;
 use super::{Camera, Lens, LensKind, MAX_LENS_PARAMETERS, SplineGrid};
 
-/// Maximum size of a camera file in bytes. Most have less than a hundredth of it. YAML parsers take time with the
-/// square of the size.
+/// Maximum size of a camera file, bytes. Most files are smaller than a hundredth of it. The time of
+/// YAML parsers grows with the square of the size.
 const MAX_BYTES: usize = 50_000;
 
 /// Maximum nesting of lists and maps; a camera has two levels.
@@ -121,7 +121,7 @@ struct Matrix {
 }
 
 impl Matrix {
-    /// Checks the size of the matrix, as far as it is stated.
+    /// Checks the size of the matrix if the file states it.
     fn check(&self) -> Result<(), String> {
         let stated = self.rows.zip(self.cols).map(|(rows, cols)| rows.saturating_mul(cols));
         match (stated, self.data.len()) {
@@ -141,7 +141,7 @@ impl Camera {
     /// Reads the camera of a camera file, see [`CameraFile::from_yaml`].
     ///
     /// # Errors
-    /// As [`CameraFile::from_yaml`].
+    /// See [`CameraFile::from_yaml`].
     pub fn from_yaml(text: &str) -> Result<Camera, CameraFileError> {
         CameraFile::from_yaml(text).map(|file| file.camera)
     }
@@ -325,7 +325,7 @@ mod tests {
 
     #[test]
     fn every_model_survives_a_file() {
-        // Of a perspective lens the last ones are zero here.
+        // In this second perspective lens, the coefficients after the eighth are zero.
         let short = (LensKind::BrownConrady, 8);
         for (kind, count) in LensKind::ALL.iter().map(|kind| (*kind, 40)).chain([short]) {
             let grid = SplineGrid::new(3, [5, 4], 90).ok().filter(|_| kind == LensKind::Spline);

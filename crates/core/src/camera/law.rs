@@ -7,7 +7,7 @@ use crate::quantity::Range;
 /// A half-line in the camera frame: the line of sight of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Start point, mm: zero unless the lens is not central.
+    /// Start point, mm; zero for a central lens.
     pub origin: DVec3,
     /// Direction, a unit vector of the camera frame.
     pub direction: DVec3,
@@ -20,7 +20,8 @@ impl Ray {
     }
 }
 
-/// A point of the normalised image plane with its derivatives by the point in the camera frame: rows x', y'; columns
+/// A point of the normalised image plane with its derivatives with respect to the point in the
+/// camera frame: rows x', y'; columns
 /// X, Y, Z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Imaged {
@@ -52,7 +53,8 @@ pub(super) trait LensLaw {
         None
     }
 
-    /// Returns the image of a point, and writes the derivatives of x', y' by each parameter to `by_parameters`.
+    /// Returns the image of a point, and writes the derivatives of x', y' with respect to each
+    /// parameter to `by_parameters`.
     /// Returns `None` if the formula has no value there that an optimiser may use.
     fn image(&self, point: DVec3, by_parameters: &mut [[f64; 2]]) -> Option<Imaged>;
 
@@ -64,8 +66,9 @@ pub(super) trait LensLaw {
     /// Returns the ray that is imaged at a point of the normalised plane, if there is one.
     fn ray(&self, at: DVec2) -> Option<Ray>;
 
-    /// Returns the radius on the normalised plane up to which it increases steadily with the angle, without fold or
-    /// pole; `None` if it does so over the whole field of view.
+    /// Returns the radius on the normalised plane up to which the radius increases monotonically
+    /// with the angle, without a fold or pole. Returns `None` if it does so over the whole field of
+    /// view.
     fn monotonic_radius(&self) -> Option<f64> {
         None
     }

@@ -10,8 +10,9 @@ use crate::quantity::Range;
 /// Largest number of parameters of a lens whose parameters all affect every point; those of a spline act locally.
 pub const MAX_LENS_PARAMETERS: usize = 12;
 
-/// Makes the enum of lenses from one line for each: its type, the name of its model in camera files, its name in messages,
-/// and its start value for a number of coefficients and an optional grid.
+/// Defines the enum of lenses. Each line contains a type, the name of the model in camera files,
+/// the name in messages, and a start value. The start value depends on the number of coefficients
+/// and an optional grid.
 macro_rules! lenses {
     ($($(#[$doc:meta])* $lens:ident $name:literal $title:literal $given:pat => $start:expr,)*) => {
         /// Projection from the camera frame to the normalised image plane.
@@ -93,13 +94,13 @@ lenses! {
 }
 
 impl Lens {
-    /// The ranges of its parameters, from the first; those without one have that of coefficients.
+    /// Returns the ranges of the first parameters; the others have the range of coefficients.
     pub fn ranges(&self) -> &'static [Range] {
         self.law().ranges()
     }
 
-    /// How many coefficients a camera file has at least, where those left out at the end are zero; `None` where all are
-    /// there.
+    /// Returns the minimum number of coefficients in a camera file, which omits zeros at the end.
+    /// Returns `None` if a file always has all of them.
     pub fn least_coefficients(&self) -> Option<usize> {
         self.law().least_coefficients()
     }
@@ -114,7 +115,7 @@ impl Lens {
         self.law().parameters()
     }
 
-    /// Returns the lens with other parameter values; `values` has one entry per parameter.
+    /// Returns the lens with new parameter values; `values` has one entry per parameter.
     pub fn with_parameters(&self, values: &[f64]) -> Self {
         let mut lens = self.clone();
         lens.law_mut().set_parameters(values);
@@ -147,8 +148,9 @@ impl Lens {
         self.law().ray(at)
     }
 
-    /// Returns the radius on the normalised plane up to which it increases steadily with the angle, without fold or
-    /// pole; `None` if it does so over the whole field of view.
+    /// Returns the radius on the normalised plane up to which the radius increases monotonically
+    /// with the angle, without a fold or pole. Returns `None` if it does so over the whole field of
+    /// view.
     pub fn monotonic_radius(&self) -> Option<f64> {
         self.law().monotonic_radius()
     }

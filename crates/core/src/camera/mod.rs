@@ -46,7 +46,7 @@ pub use spline::{Knots, Spline, SplineGrid, SplineGridError};
 pub use spline::{MAX_TOUCHED, direction as stereographic_direction};
 pub use undistortion::{Field, PixelMap, Undistortion, UndistortionError};
 
-/// The parameters that every camera has, in front of those of its lens.
+/// The parameters that every camera has. They precede those of its lens.
 pub const PROJECTION_PARAMETERS: [&str; 4] = ["fx", "fy", "cx", "cy"];
 
 /// Largest number of parameters of a camera whose lens is not a spline.
@@ -72,25 +72,27 @@ pub struct Camera {
 pub struct Projection {
     /// Position in the image, px.
     pub pixel: DVec2,
-    /// Derivatives by the coordinates X, Y, Z of the point in the camera frame, px/mm.
+    /// Derivatives with respect to the coordinates X, Y, Z of the point in the camera frame, px/mm.
     pub by_point: [[f64; 3]; 2],
-    /// Derivatives of x and y by each parameter, in the order of [`Camera::parameter_names`]. Entries beyond the
+    /// Derivatives of x and y with respect to each parameter, in the order of
+    /// [`Camera::parameter_names`]. Entries beyond the
     /// number of parameters are not filled. For a spline, only the first four are: see [`Self::by_parameter`].
     pub by_parameters: [[f64; 2]; MAX_PARAMETERS],
     /// Knots of a spline that affect the position.
     pub knots: Option<Knots>,
-    /// Focal lengths, px: derivatives of the pixel by the normalised image.
+    /// Focal lengths, px: derivatives of the pixel with respect to the normalised image.
     focal_px: DVec2,
 }
 
 impl Projection {
-    /// Returns the derivative of a pixel coordinate by the same coordinate of the normalised image.
+    /// Returns the derivative of a pixel coordinate with respect to the same coordinate of the
+    /// normalised image.
     #[doc(hidden)]
     pub fn by_image(&self, coordinate: usize) -> f64 {
         self.focal_px[coordinate]
     }
 
-    /// Returns the derivatives of x and y by a parameter of the camera, for any lens.
+    /// Returns the derivatives of x and y with respect to a parameter of the camera, for any lens.
     pub fn by_parameter(&self, index: usize) -> [f64; 2] {
         let of_lens = index.checked_sub(PROJECTION_PARAMETERS.len());
         match (self.knots, of_lens) {
@@ -139,7 +141,7 @@ impl Camera {
         values
     }
 
-    /// Returns the camera with other parameter values; `values` has one entry per parameter.
+    /// Returns the camera with new parameter values; `values` has one entry per parameter.
     pub fn with_parameters(&self, values: &[f64]) -> Self {
         Self {
             width: self.width,
@@ -158,7 +160,7 @@ impl Camera {
     /// use glam::{DVec2, DVec3};
     ///
     /// let camera = Camera::pinhole(640, 480, std::f64::consts::FRAC_PI_2);
-    /// // Half of a field of view of 90° to the right is the middle of the right image edge.
+    /// // The field of view is 90°, so a point 45° to the right is at the middle of the right edge.
     /// let pixel = camera.project(DVec3::new(200.0, 0.0, 200.0)).unwrap();
     /// assert!(pixel.abs_diff_eq(DVec2::new(639.5, 239.5), 1e-9));
     /// let ray = camera.unproject(pixel).unwrap();
@@ -169,7 +171,8 @@ impl Camera {
         self.lens.covers(point).then_some(projection.pixel)
     }
 
-    /// Projects a point with the derivatives by the point and by every parameter. Unlike [`Self::project`], it
+    /// Projects a point and computes the derivatives with respect to the point and to every
+    /// parameter. Unlike [`Self::project`], it
     /// ignores gaps in the domain of a rational lens, because an optimiser must cross them.
     pub fn project_with_derivatives(&self, point: DVec3) -> Option<Projection> {
         let focal = self.focal_px;

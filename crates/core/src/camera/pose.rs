@@ -44,8 +44,9 @@ impl Pose {
         }
     }
 
-    /// Returns the difference of this pose from another one between the same frames: the rotation exp(ω) after the
-    /// other's rotation, rad, at most 180°, and the translation τ, mm.
+    /// Returns the difference ω, τ from another pose between the same frames. Rotating by exp(ω)
+    /// after the other's rotation gives this rotation; ω is in rad and at most 180° long. τ is the
+    /// difference of the translations, mm.
     pub fn off(&self, other: &Pose) -> [DVec3; 2] {
         let turn = self.rotation * other.rotation.conjugate();
         // A quaternion and its negative are the same rotation; one of them represents an angle above 180°.
@@ -74,11 +75,11 @@ impl Pose {
     }
 }
 
-/// Tolerance for the orthonormality of a rotation: the rounding of six written digits.
+/// Tolerance for the orthonormality of a rotation: the rounding error of numbers with six digits.
 const ROTATION_SLACK: f64 = 1e-5;
 
-/// Returns whether a row-major matrix is a rotation: orthonormal and not a reflection, up to rounding of written
-/// digits.
+/// Returns whether a row-major matrix is a rotation: orthonormal and not a reflection, up to the
+/// rounding of numbers in files.
 pub fn is_rotation(rows: &[f64; 9]) -> bool {
     let matrix = DMat3::from_cols_array(rows);
     let off = matrix * matrix.transpose() - DMat3::IDENTITY;

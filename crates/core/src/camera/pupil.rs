@@ -6,8 +6,8 @@ use super::brown_conrady::solve;
 use super::equidistant::{self, Angle};
 use super::law::{Imaged, LensLaw, Ray};
 
-/// Newton iterations for the angle and for the tangential terms. The start differs only by the small effects of pupil
-/// and tilt; five iterations reach the last bit.
+/// Newton iterations for the angle and for the tangential terms. The start is off only by the small
+/// effects of pupil and tilt; five iterations give full precision.
 const ITERATIONS: usize = 30;
 
 /// Convergence threshold of Newton steps, rad: the rounding error of an angle.
@@ -24,7 +24,8 @@ const CONVERGED_RAD: f64 = 1e-14;
 ///     y' = v + p1 (r² + 2v²) + 2 p2 uv
 /// ```
 ///
-/// Valid up to θ = π, as long as r increases with θ and no other ray near by passes through the point. Parameters are
+/// Valid up to θ = π, as long as r increases with θ and no other nearby ray passes through the
+/// point. Parameters are
 /// in the order k1 … k5, p1, p2, e1, e2, e3.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pupil {

@@ -5,12 +5,13 @@ use glam::DVec2;
 
 use super::Camera;
 
-/// Number of bisections of an interval; they reach the last bit.
+/// Number of bisections of an interval: enough for full precision.
 const HALVINGS: usize = 100;
 
 impl Camera {
-    /// Returns the radius from the principal point, px, up to which the image grows steadily with the angle; `None`
-    /// if it does so over the whole field of view. Ignores tangential terms, which change the radius only slightly.
+    /// Returns the distance from the principal point, px, up to which it increases monotonically
+    /// with the angle. Returns `None` if it does so over the whole field of view. Ignores
+    /// tangential terms, which change the radius only slightly.
     ///
     /// ```
     /// use deltille_core::camera::{BrownConrady, Camera, Lens};
@@ -63,8 +64,9 @@ pub(super) fn slope_times_q(polynomial: &[f64]) -> Vec<f64> {
     polynomial.iter().enumerate().map(|(power, c)| power as f64 * c).collect()
 }
 
-/// Returns the positions between 0 and `end` where a polynomial changes its sign, in order. Between two of its
-/// extrema, which are the sign changes of the derivative, there is at most one.
+/// Returns the positions between 0 and `end` where a polynomial changes its sign, in order. Its
+/// extrema are the sign changes of the derivative. Between two adjacent extrema there is at most
+/// one sign change.
 pub(super) fn sign_changes(polynomial: &[f64], end: f64) -> Vec<f64> {
     if polynomial.len() < 2 {
         return Vec::new();

@@ -17,16 +17,16 @@ pub enum RectificationError {
     /// The cameras have no baseline.
     #[error("both cameras are at the same position")]
     Coincident,
-    /// The cameras look in too different directions.
+    /// The viewing directions of the cameras differ too much.
     #[error(
-        "the viewing directions differ by {degrees:.0}°, so no rectified view covers what both cameras see"
+        "the viewing directions differ by {degrees:.0}°, so no rectified view covers their common field of view"
     )]
     Apart {
         /// Angle between the axes, degrees.
         degrees: f64,
     },
     /// The cameras are one behind the other.
-    #[error("one camera is in front of the other, so no rectified view has them side by side")]
+    #[error("one camera is in front of the other, so the pair cannot be rectified")]
     Behind,
     /// The view does not exist.
     #[error(transparent)]
@@ -47,7 +47,8 @@ pub struct Rectification {
 impl Rectification {
     /// Rectifies two cameras with poses camera_from_rig. Four rotations about the optical axis align rows or columns
     /// with the baseline. Both views use the one closest to the first camera's orientation. OpenCV's `stereoRectify`
-    /// uses the middle between both cameras, and rotates both images by 90° if one is upside down.
+    /// uses the orientation midway between both cameras, and rotates both images by 90° if one is
+    /// upside down.
     ///
     /// # Errors
     /// Returns an error if there is no common side-by-side view.
@@ -76,7 +77,7 @@ impl Rectification {
         };
         let [first, second] = cameras;
         let focal = [view(first, field)?, view(second, field)?].map(|v| v.view().focal_px.x);
-        // The part inside both images, or all of both.
+        // The field of view inside both images, or the one that contains both images.
         let common = match field {
             Field::Whole => focal[0].min(focal[1]),
             _ => focal[0].max(focal[1]),
@@ -85,8 +86,9 @@ impl Rectification {
         Ok(Self { views: [view(first, field)?, view(second, field)?], baseline_mm })
     }
 
-    /// Returns the matrix Q that maps x, y, disparity, 1 (px, in the first view) to a point X, Y, Z, W in the frame
-    /// of the first view, to be divided by W, mm. The disparity is x of the first view minus x of the second, or the
+    /// Returns the matrix Q that maps x, y, disparity, 1 (px, in the first view) to homogeneous
+    /// coordinates X, Y, Z, W of a point in the frame of the first view, mm. The disparity is x of
+    /// the first view minus x of the second, or the
     /// same with y.
     pub fn depth_matrix(&self) -> DMat4 {
         let view = self.views[0].view();
@@ -102,8 +104,8 @@ impl Rectification {
     }
 }
 
-/// Returns the frame in which both cameras look forward side by side, from that of the rig, and the position of the
-/// second camera relative to the first.
+/// Returns the rotation from the rig frame to the frame in which both cameras face forward side by
+/// side. Also returns the position of the second camera relative to the first.
 fn common_frame(poses: [Pose; 2]) -> Result<(DQuat, DVec3), RectificationError> {
     let [from, to] = poses.map(|pose| pose.inverse().translation);
     let rotations = poses.map(|pose| pose.rotation.conjugate());
@@ -173,7 +175,7 @@ mod tests {
                 assert!(same.abs() < 1e-9, "{off}");
                 let found = made.depth_matrix() * DVec4::new(a.x, a.y, disparity, 1.0);
                 assert!((found.truncate() / found.w).distance(first) < 1e-6);
-                // The maps lead to the positions where the cameras themselves see the point.
+                // The maps give the positions at which the cameras image the point.
                 for (index, (camera, pose), pixel) in [(0, cameras[0], a), (1, cameras[1], b)] {
                     let seen = camera.project(pose.apply(point)).unwrap();
                     assert!(made.views[index].source(pixel).unwrap().distance(seen) < 1e-6);

@@ -3,8 +3,8 @@ use serde::{Deserialize, Serialize};
 
 use super::law::{Imaged, LensLaw, Ray};
 
-/// Range of knots along a side: at least one patch of the cubic spline, and at most more than any calibration
-/// determines.
+/// Range of knots along a side: the minimum is one patch of the cubic spline, and the maximum
+/// exceeds what any calibration determines.
 const KNOTS: std::ops::RangeInclusive<usize> = 4..=40;
 
 /// Range of the field of view that a grid covers, degrees; at 360° the plane is infinite.
@@ -13,7 +13,8 @@ const FOV_X_DEG: std::ops::RangeInclusive<u32> = 1..=350;
 /// Relative distance from the direction opposite to the axis below which points have no position on the plane.
 const BEHIND: f64 = 1e-6;
 
-/// Newton iterations of the inverse; from a start within half a knot spacing, six reach the last bit.
+/// Newton iterations of the inverse; from a start within half a knot spacing, six give full
+/// precision.
 const ITERATIONS: usize = 50;
 
 /// Number of halvings of a step that increases the residual.
@@ -28,8 +29,9 @@ const STEPS_A_KNOT: f64 = 4.0;
 
 /// Grid of spline knots over the stereographic plane.
 ///
-/// The grid is centred on the plane with equal distances h along both axes. The spline is determined over `fov_x_deg`
-/// across. For degree 3 this range ends one knot spacing inside the outermost knots, for degree 2 half a spacing.
+/// The grid is centred on the plane with equal distances h along both axes. The spline is
+/// determined across a horizontal field of view of `fov_x_deg`. For degree 3 this range ends one
+/// knot spacing inside the outermost knots, for degree 2 half a spacing.
 ///
 /// ```text
 ///     (columns − 3) h = 4 tan(fov_x/4)   degree 3        (columns − 2) h = 4 tan(fov_x/4)   degree 2
@@ -60,7 +62,8 @@ pub struct SplineGridError(String);
 ///     (x', y') = u + Σ B(i − a) B(j − b) d_ab                   a: column, b: row
 /// ```
 ///
-/// with B the uniform B-spline of the degree, so a point depends on the (degree + 1)² knots around it. Beyond the
+/// Here B is the uniform B-spline of this degree. So the image of a point depends on the (degree +
+/// 1)² knots around it. Beyond the
 /// grid the outermost polynomials continue, but points there are invalid. Within the grid, points are valid where
 /// orientation is preserved (∂(x', y')/∂u has a positive determinant). Parameters are dx, dy of the knots, row by
 /// row.
@@ -145,8 +148,8 @@ impl SplineGrid {
         Self::new(self.degree, [self.columns, self.rows], self.fov_x_deg)
     }
 
-    /// Returns the grid with knots at most `distance` apart, unless there would be too many, that is determined over
-    /// |u| up to `reach`.
+    /// Returns a grid that is determined over |u| up to `reach`. Its knots are at most `distance`
+    /// apart, unless there would be too many.
     pub fn dense(degree: usize, distance: f64, reach: DVec2) -> Self {
         let (least, most) = (*KNOTS.start() as f64, *KNOTS.end() as f64);
         let knots = (2.0 * reach / distance).ceil() + degree as f64;
@@ -198,7 +201,7 @@ struct Basis {
     /// Index of the first one.
     first: usize,
     value: [f64; MAX_ORDER],
-    /// Derivatives by the coordinate.
+    /// Derivatives with respect to the coordinate.
     slope: [f64; MAX_ORDER],
 }
 
@@ -258,7 +261,7 @@ impl Spline {
         Self { grid, knots: vec![DVec2::ZERO; grid.count()] }
     }
 
-    /// Returns the lens with other knots, row by row; their number stays the same.
+    /// Returns the lens with new knots, row by row; their number stays the same.
     #[must_use]
     pub fn with_knots(self, knots: Vec<DVec2>) -> Self {
         debug_assert_eq!(knots.len(), self.grid.count());
@@ -342,7 +345,7 @@ impl LensLaw for Spline {
         }
     }
 
-    /// [`Spline::knots_of`] provides the derivatives by parameters.
+    /// [`Spline::knots_of`] provides the derivatives with respect to the parameters.
     fn image(&self, point: DVec3, _: &mut [[f64; 2]]) -> Option<Imaged> {
         let u = flattened(point)?;
         let (at, by_u) = self.bent(u);

@@ -21,7 +21,8 @@ const ALONG: usize = 128;
 /// Ratio of the widest view to the narrowest, which shows little more than a pixel.
 const NARROWEST: f64 = 1e3;
 
-/// Fraction of the fold radius of a lens that is used: the angle grows with the root of the rest.
+/// Used fraction of the fold radius of a lens. The unused range of angles grows with the square
+/// root of the unused fraction.
 const STEADY_PART: f64 = 1.0 - 1e-6;
 
 /// Field of view of a pinhole view.
@@ -50,7 +51,7 @@ pub enum UndistortionError {
         degrees: f64,
     },
     /// The camera does not see the direction of the view.
-    #[error("the camera sees nothing along the axis of the view")]
+    #[error("the optical axis of the view is outside the camera's field of view")]
     Nothing,
 }
 
@@ -82,10 +83,10 @@ pub struct Undistortion {
 }
 
 impl Undistortion {
-    /// Creates a view of a width and height, px, that looks along the camera's axis.
+    /// Creates a view along the camera's axis, with the given width and height, px.
     ///
     /// # Errors
-    /// Returns an error if no pinhole shows the field.
+    /// Returns an error if no pinhole view covers the field of view.
     pub fn new(
         camera: &Camera,
         size_px: [u32; 2],
@@ -94,8 +95,8 @@ impl Undistortion {
         Self::rotated(camera, DQuat::IDENTITY, size_px, field)
     }
 
-    /// Creates a view in another direction: `view_from_camera` rotates directions of the camera frame to that of the
-    /// view.
+    /// Creates a view in another direction: `view_from_camera` rotates directions from the camera
+    /// frame to the view frame.
     ///
     /// # Errors
     /// Returns an error if no pinhole shows the field.
@@ -124,8 +125,8 @@ impl Undistortion {
         Ok(widest.with_focal(focal))
     }
 
-    /// Returns the view of points at a distance from the camera, mm. Only for lenses that are not central does it
-    /// differ from that of distant points.
+    /// Returns the view for points at a distance from the camera, mm. It differs from the view of
+    /// distant points only if the lens is not central.
     #[must_use]
     pub fn at_distance(self, distance_mm: f64) -> Self {
         Self { distance_mm, ..self }

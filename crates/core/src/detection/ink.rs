@@ -1,4 +1,4 @@
-//! Ink spread (dot gain) of a print: dark areas have grown.
+//! Ink spread (dot gain) of a print: the growth of its dark areas.
 //!
 //! Ink spread belongs to the print, not to the image. It displaces corners on the paper as tone curves displace them
 //! in the image. Line crossings and tilt separate the two effects.
@@ -9,7 +9,7 @@ use crate::quantity;
 use crate::statistics::median;
 use crate::words::places;
 
-/// Ink spread of the print, as far as it is known: the growth of dark areas on every side.
+/// Ink spread of the print, known or to be estimated: the growth of dark areas on every side.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Ink {
     /// Estimated from the corners of each image.
@@ -19,7 +19,7 @@ pub enum Ink {
     Um(f64),
 }
 
-/// Largest accepted ink spread, µm: more fills the space between the bits of tags.
+/// Largest accepted ink spread, µm. A larger one fills the space between the bits of tags.
 const MAX_UM: f64 = 1000.0;
 
 impl std::str::FromStr for Ink {
@@ -86,7 +86,8 @@ impl InkEstimate {
     }
 
     /// Combines estimates from images of one print by their weighted median, so that an image of something else has
-    /// no influence. Returns `None` for no estimates. The standard deviation follows from those of the images, or
+    /// no influence. Returns `None` if there are no estimates. The standard deviation follows from
+    /// those of the images, or
     /// from their scatter if that is larger.
     pub fn of_all(pictures: &[Self]) -> Option<Self> {
         // Estimates that already combine all images are equal; they count once.

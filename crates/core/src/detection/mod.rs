@@ -17,6 +17,6 @@ pub use tone::{Curve, Piece, TERMS, TONE_PARAMS, Tone, ToneEstimate};
 pub use values::{DecodedTag, Detection, Grid, GridCorner};
 pub use watch::{FrameStatus, Watch};
 
-/// Shortest median edge of an accepted grid without a confirming tag, px. In smaller tiles blur leaves only the
-/// fundamental wave, which is the same for squares, dots and threads.
+/// Shortest median edge of an accepted grid without a confirming tag, px. In smaller tiles, blur
+/// leaves only the fundamental frequency, which is the same for squares, dots and threads.
 pub const MIN_UNTAGGED_EDGE_PX: f64 = 7.0;

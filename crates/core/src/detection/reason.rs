@@ -32,7 +32,7 @@ pub struct Reason {
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum ReasonKind {
-    /// The image contains no candidate corners and no known cause: `corners`.
+    /// The image contains no candidate corners, and the cause is unknown: `corners`.
     NoCorners,
     /// The brightest pixels are dark: `brightest`, a fraction of full scale.
     TooDark,
@@ -46,8 +46,8 @@ pub enum ReasonKind {
     TooSmall,
     /// The corners belong to the other tiling: `corners`.
     OtherTiling,
-    /// Tag cells are too small or too blurred to be read: `bit_px`, `blur_px`, `needed_bit_px`. Without the last,
-    /// their contrast is too low for the noise.
+    /// Tag cells are too small or too blurred to be read: `bit_px`, `blur_px`, `needed_bit_px`. If
+    /// the last is missing, the contrast of the cells is too low for the noise.
     UnreadableTags,
     /// No complete tile that could carry a tag is visible: `corners`.
     NoTiles,
@@ -65,7 +65,8 @@ pub enum ReasonKind {
     Ambiguous,
     /// The grid is smaller or larger than the board whose outline would label it: `corners`, `expected`.
     NotWhole,
-    /// The grid is larger than any board, so it was not searched for one: `corners`, and `expected` at most.
+    /// The grid is larger than any board, so it was not searched for one: `corners`, and the
+    /// maximum as `expected`.
     TooManyCorners,
     /// Like [`NotWhole`](Self::NotWhole), but the grid ends at the border of the image: `corners`, and `expected` for
     /// boards without tags.
@@ -126,7 +127,7 @@ impl fmt::Display for Reason {
                 figure("blur_px")
             ),
             ReasonKind::NoGrid => {
-                write!(f, "found {}, but they form no grid", count("corners", "corner"))
+                write!(f, "found {}, but they do not form a grid", count("corners", "corner"))
             }
             ReasonKind::TooSmall => write!(
                 f,
@@ -180,7 +181,7 @@ impl fmt::Display for Reason {
             ),
             ReasonKind::OtherFamily => write!(
                 f,
-                "none of {} read with certainty shows a tag of the target's family; is the family right?",
+                "none of {} decoded reliably shows a tag of the target's family; is the family correct?",
                 count("tiles", "tile")
             ),
             ReasonKind::Mirrored => write!(
@@ -197,7 +198,7 @@ impl fmt::Display for Reason {
             }
             ReasonKind::NotWhole if figure("corners") == figure("expected") => write!(
                 f,
-                "a grid of {} has different rows and columns from the board; are they swapped?",
+                "a grid of {} has different numbers of rows and columns than the board; are they swapped?",
                 count("corners", "corner")
             ),
             ReasonKind::NotWhole => write!(

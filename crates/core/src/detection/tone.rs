@@ -1,21 +1,22 @@
 //! Tone curves: the grey values that a camera assigns to light.
 //!
 //! A curve is stored as its inverse, the light q(y) of a grey value y. The inverse is smooth near black, where the
-//! curve itself is steep. The slope of an unknown curve follows powers of the distances from black and white. They
-//! cover gammas (p₁ = γ − 1), sRGB and s-curves (p₁ and p₃),
+//! curve itself is steep. The slope of an unknown curve is modelled by powers of the distances from
+//! black and white. The model covers gammas (p₁ = γ − 1), sRGB and s-curves (p₁ and p₃),
 //!
 //! ```text
 //!     ln q'(y) = p₁ ln(y + δ) + p₂ t + p₃ ln(1 − y + δ) + const,      t = (y − middle)/half
 //! ```
 //!
-//! so that q rises for all values of p; p = 0 is a linear camera. A corner covers the part of the curve between its
-//! own black (S = −1) and white (S = 1), in its own units:
+//! so that q rises for all values of p; p = 0 is a linear camera. A corner covers the part of the curve
+//! between its own black (S = −1) and white (S = 1), in units of S:
 //!
 //! ```text
 //!     T(S) = S + (1 − S²)·(κ₀ + κ₁ S + … + κ₅ S⁵)
 //! ```
 //!
-//! It passes through the curve at eight points. Between 5 % and 100 % of the light, it is within 0.3 % of gamma 2.6.
+//! The polynomial T interpolates the curve at eight points. Between 5 % and 100 % of the light, it
+//! is within 0.3 % of gamma 2.6.
 //! The constant κ₀ displaces corners, see `docs/formulation.md`, “Measured corners”.
 
 use std::sync::LazyLock;
@@ -24,7 +25,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::quantity;
 
-/// The tone curve of a camera, as far as it is known.
+/// The tone curve of a camera, known or to be estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum Tone {
@@ -121,8 +122,8 @@ const SLOPE_SAMPLES: usize = 2 * NODES - 1;
 static TO_ENDS: LazyLock<Vec<[f64; 2]>> =
     LazyLock::new(|| (0..SLOPE_SAMPLES).map(|i| to_ends(sample_grey(i))).collect());
 
-/// Distance δ from black and white below which the slope of an estimated curve is constant. Few grey values are
-/// closer, and that of sRGB is twice as large.
+/// Distance δ from black and white below which the slope of an estimated curve is constant. Few
+/// grey values are closer. The corresponding distance of sRGB is twice as large.
 const END: f64 = 0.03;
 
 /// Toe of a power curve, relative to full scale, half that of sRGB. Below it the curve is a line.

@@ -10,8 +10,8 @@ use crate::detection::Detection;
 /// under two pixels in an image 1280 px wide that is exposed for half of the frame interval.
 const STILL: f64 = 0.004;
 
-/// Distance from the position in every kept image above which corners are in a new position, as a fraction of the
-/// image width.
+/// Mean distance from the corner positions of every kept image above which the position is new, as
+/// a fraction of the image width.
 const ELSEWHERE: f64 = 0.08;
 
 /// Fewest labelled corners of a kept image: enough for a homography with redundancy.
@@ -43,7 +43,7 @@ pub struct FrameStatus {
     pub corners: usize,
     /// Whether the corners have not moved since the previous image.
     pub is_still: bool,
-    /// Whether the corners are in a different position than in every kept image.
+    /// Whether the corner positions differ from those in every kept image.
     pub is_new: bool,
 }
 

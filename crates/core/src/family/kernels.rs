@@ -73,7 +73,7 @@ pub(super) fn count_distances(word: u64, list: &[u64], counts: &mut [u64; 65]) {
 }
 
 /// Descends one level in the tree of the sweep of [`super::lexicode`]. Keeps the entries whose distance stays at most
-/// `slack` after comparing the three bits from `shift` on with `symbol`.
+/// `slack` after the three bits that start at `shift` are compared with `symbol`.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512vl+avx512vpopcntdq+popcnt",
     "x86_64+avx2+popcnt"

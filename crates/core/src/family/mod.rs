@@ -19,7 +19,7 @@
 //! position only together with the neighbouring tags.
 //!
 //! Families of square tags, the AprilTags of checkerboards, are read, decoded, drawn and certified like the others,
-//! with their four rotations by 90°. They cannot be searched here.
+//! with their four rotations by 90°. This project does not search for new ones.
 //!
 //! The modules, in the order in which a family is made and used:
 //!
@@ -109,7 +109,8 @@ impl Family {
     /// match the family.
     ///
     /// # Errors
-    /// Returns an error if the name is not a file name or states other bits or another distance, or if a code is too
+    /// Returns an error if the name is not a valid file name or states other bits or another
+    /// distance, or if a code is too
     /// wide or occurs twice.
     pub fn new(
         name: &str,
@@ -155,7 +156,8 @@ impl Family {
         })
     }
 
-    /// Returns the family together with that of the squares of a target with faces of both tilings. A family file
+    /// Returns the family with the family of the squares added, for a target with faces of both
+    /// tilings. A family file
     /// contains only one of them.
     pub fn with_squares(self, squares: Family) -> Self {
         Self { squares: Some(Box::new(squares)), ..self }
@@ -310,7 +312,8 @@ impl Family {
     }
 
     /// Returns the probability that a word of fair coin tosses is mistaken for a tag, for 0, 1, …,
-    /// [`Self::correctable`] corrected bits. For position codes, every word is the word of a place. Image content is
+    /// [`Self::correctable`] corrected bits. For position codes, every word is the word of a
+    /// position. Image content is
     /// rarely that complex: see [`Self::natural_false_positive_rates`].
     pub fn false_positive_rates(&self) -> Vec<f64> {
         if self.is_position_family() {

@@ -32,8 +32,9 @@ impl Rules {
         free: None,
     };
 
-    /// Returns the rules of the published families: half of the pairs differ, and the untagged tile is as far as
-    /// another code (`docs/families.md`, “What a family is”). The distance from a code to its own rotations is always
+    /// Returns the rules of the published families: half of the pairs differ, and the untagged tile
+    /// is at the same distance as another code (`docs/families.md`, “What a family is”). The
+    /// distance from a code to its own rotations is always
     /// h.
     pub fn published(distance: u32) -> Self {
         Self { min_complexity: 0.5, black_distance: distance, ..Self::NONE }
@@ -138,13 +139,15 @@ impl Screen {
         self.min_pairs
     }
 
-    /// Returns the number of differing cells that is always sufficient, whichever cells these are.
+    /// Returns the number of differing cells that is always sufficient, regardless of which cells
+    /// they are.
     #[doc(hidden)]
     pub fn reach(&self) -> u32 {
         self.reach
     }
 
-    /// Returns whether words with this difference are far enough apart, with hidden cells too. Rotating both words
+    /// Returns whether words with this difference are far enough apart, even with hidden cells.
+    /// Rotating both words
     /// changes nothing, as hidden cells may lie anywhere.
     #[inline]
     pub fn is_apart(&self, difference: u64) -> bool {

@@ -231,8 +231,9 @@ fn bit_of(kind: GridKind, d: u32, cell: Cell) -> u32 {
 
 /// Returns the cell that a counterclockwise rotation moves onto `cell`.
 ///
-/// In barycentric cell coordinates (towards B, C, A) = (col, row, rest), a rotation by 120° maps (b, c, a) to (a, b,
-/// c), so the cell at (col, row, rest) came from (row, rest, col). A rotation by 90° maps column c, row r to column d
+/// In barycentric cell coordinates (towards B, C, A) = (col, row, rest), a rotation by 120° maps
+/// (b, c, a) to (a, b, c). So the cell at (col, row, rest) came from (row, rest, col). A rotation
+/// by 90° maps column c, row r to column d
 /// − 1 − r, row c.
 fn source_of(kind: GridKind, d: u32, cell: Cell) -> Cell {
     if kind == GridKind::Checker {

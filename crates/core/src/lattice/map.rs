@@ -4,8 +4,8 @@ use super::{GridKind, Orientation, Tile, Vertex};
 /// shift.
 ///
 /// Rotations by 120° keep upright tiles upright; odd multiples of 60° exchange the two colours. On a checkerboard,
-/// colours are exchanged if turns + row + column of the shift are odd. Reflections are excluded on purpose: a
-/// mirrored board is an error, never a view.
+/// colours are exchanged if turns + row + column of the shift is odd. Reflections are excluded on
+/// purpose: a mirrored board is an error, never a valid view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct LatticeMap {
     kind: GridKind,

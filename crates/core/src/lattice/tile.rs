@@ -44,8 +44,9 @@ impl GridKind {
         }
     }
 
-    /// Returns the relative loss of edge length when all edges of a tile move inwards by a fraction `part` of it (in
-    /// tile coordinates, see [`Tile::frame`]): 1 − insets · part remains.
+    /// Returns the relative loss of edge length per unit of inset. If all edges of a tile move
+    /// inwards by `part` (in tile coordinates, see [`Tile::frame`]), the fraction 1 − insets · part
+    /// of an edge remains.
     pub const fn insets(self) -> f64 {
         match self {
             Self::Deltille => 3.0,
@@ -101,8 +102,9 @@ impl GridKind {
         tiles.filter(move |tile| tile.vertices().any(|v| v == vertex))
     }
 
-    /// Returns the tiles whose first vertex is `vertex`. For a set of vertices, these are all tiles with no other
-    /// vertices, each once. The anchor of an inverted triangle is not one of its vertices.
+    /// Returns the tiles whose first vertex is `vertex`. Over a set of vertices, this yields every
+    /// tile whose vertices are all in the set, exactly once. The anchor of an inverted triangle is
+    /// not one of its vertices.
     pub fn tiles_from(self, vertex: Vertex) -> impl Iterator<Item = Tile> {
         self.tiles_around(vertex).filter(move |tile| tile.vertices().next() == Some(vertex))
     }
@@ -176,7 +178,7 @@ impl Tile {
     /// A + u·(B − A) + v·(C − A).
     ///
     /// An upright tile starts at its lower-left vertex, then lower right, then apex; an inverted
-    /// tile is the same figure turned by 180° and starts at its upper-right vertex. A square has
+    /// tile is the same figure rotated by 180° and starts at its upper-right vertex. A square has
     /// its lower-left, lower-right and upper-left vertex.
     pub fn frame(self) -> [Vertex; 3] {
         let a = self.anchor;

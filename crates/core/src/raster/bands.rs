@@ -7,7 +7,8 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-/// Pixels per band: work of some milliseconds, compared with which scheduling costs nothing. Smaller images are not
+/// Pixels per band: a few milliseconds of work, so that the cost of scheduling is negligible.
+/// Smaller images are not
 /// divided; usually there are many of them to share between threads.
 const BAND_PX: usize = 1 << 22;
 

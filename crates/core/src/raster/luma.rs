@@ -8,8 +8,9 @@ const WEIGHTS: [u32; 3] = [2126, 7152, 722];
 /// Sum of the weights.
 const WHOLE: u32 = 10_000;
 
-/// Converts colours to grey values. Each pixel has `BYTES` bytes, of which the first three are red, green and blue,
-/// for example of a video. The values equal those of a photograph with these colours, within 1 of 256 levels. Returns
+/// Converts colours to grey values. Each pixel has `BYTES` bytes; the first three are red, green
+/// and blue, as in a video frame. The values equal those of a photograph with these colours, within
+/// 1 of 256 levels. Returns
 /// `None` if the number of bytes does not match the width and height.
 ///
 /// ```

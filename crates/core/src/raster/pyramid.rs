@@ -100,7 +100,7 @@ fn binomial_row_of_bytes(rows: [&[u8]; 3], columns: &mut [u16], out: &mut [i16])
     }
 }
 
-/// Converts such a sum to 10 bits, rounded.
+/// Converts this sum to 10 bits, with rounding.
 #[inline(always)]
 fn bytes_to_10_bits(sum: u16) -> i16 {
     let part = ((u32::from(sum + 1) * 771) >> 16) as u16 >> 2;

@@ -2,7 +2,8 @@
 
 use super::Intensity;
 
-/// A part of memory as a grey image, row-major: rows of `width` pixels that start `stride` pixels apart.
+/// A region of memory viewed as a grey image, row-major: rows of `width` pixels that start `stride`
+/// pixels apart.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a, T> {
     width: usize,

@@ -1,6 +1,7 @@
 //! Consistency of a target file: its specification determines its panels, and the file also contains the panels.
 //!
-//! Other contents are checked against the made target: the sheets, the content printed on them, the finish, and the
+//! Other contents are checked against the target made from the specification: the sheets, the
+//! content printed on them, the finish, and the
 //! skeleton walls of a solid. The spacing of tags may differ if it gives the same tags.
 
 use super::error::{Problem, problem};
@@ -12,14 +13,15 @@ use crate::targets::{
     Corner, FamilyRef, Fingerprint, Panel, PanelPose, TagPlacement, Target, TargetSpec,
 };
 
-/// Tolerance of an edge, mm: the rounding of written digits.
+/// Tolerance of an edge, mm: the rounding of numbers in files.
 const SPEC_SLACK_MM: f64 = 1e-6;
 
-/// Tolerance of the position of a corner or panel, mm: the rounding of three written digits, and a twentieth of the
+/// Tolerance of the position of a corner or panel, mm: the rounding to three decimal places, and a
+/// twentieth of the
 /// smallest noticeable print error.
 const PLACE_SLACK_MM: f64 = 1e-3;
 
-/// Tolerance of the rotation of a panel: the rounding of six written digits.
+/// Tolerance of the rotation of a panel: the rounding of numbers with six digits.
 const ROTATION_SLACK: f64 = 1e-6;
 
 /// Compares the panels with those of the spec: a file in which one of them was changed contradicts itself. Poses and
@@ -124,7 +126,8 @@ pub(super) fn may_be_of_print(target: &Target, plan: Fingerprint) -> Result<bool
     Ok(fingerprint(&panels, family) == plan || of_spec.map_or(is_refined, |own| own == plan))
 }
 
-/// Makes the panels of a spec, and whether they have tags; `None` if the spec is a list from another program.
+/// Returns the panels of a spec, and whether they have tags; `None` if the spec is a list from
+/// another program.
 fn made(spec: &TargetSpec) -> Result<Option<(Vec<Panel>, bool)>, Problem> {
     let (made, tagged) = match spec {
         TargetSpec::Board(spec) => {

@@ -13,7 +13,8 @@ impl Target {
     /// Makes a target from `spec` with a shipped family.
     ///
     /// # Errors
-    /// Returns an error if the name is not a file name, a number is out of its range, or the family is not shipped or
+    /// Returns an error if the name is not a valid file name, a number is out of its range, or the
+    /// family is not shipped or
     /// has too few codes.
     ///
     /// ```
@@ -66,7 +67,7 @@ impl Target {
         Ok(Target { name, spec: spec.clone(), family, panels, plan: None, codes })
     }
 
-    /// Makes a target of which only the corners are known, from a list of them.
+    /// Makes a target from a list of its corners, without a specification.
     ///
     /// # Errors
     /// Returns the invalid field and its problem.
@@ -105,7 +106,7 @@ impl Target {
             if let (Some((family, ids)), Some((same, others))) =
                 (self.tags_of_tiling(kind), other.tags_of_tiling(kind))
                 && family.name == same.name
-                // The codes of a place family follow from the ids of boards.
+                // Position codes follow from the ids of boards.
                 && family.name != positions::NAME
             {
                 let settings = TagSettings::of(kind, self.tilings().count() > 1);

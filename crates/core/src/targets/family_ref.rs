@@ -23,7 +23,7 @@ pub struct FamilyRef {
 }
 
 impl FamilyRef {
-    /// Returns the family of the tags in tiles of a kind; the target must have such tags.
+    /// Returns the family of the tags in tiles of a kind; the target must have tags of this kind.
     pub fn of_tiling(&self, kind: GridKind) -> &Self {
         match (kind, &self.squares) {
             (GridKind::Checker, Some(squares)) => squares,

@@ -39,7 +39,7 @@ const COVARIANCE_SLACK: f64 = 1e-6;
 #[non_exhaustive]
 pub enum TargetFileError {
     /// The text is not JSON or is truncated.
-    #[error("not a target file: {}; make it again with {TargetToJson}", in_words(.0))]
+    #[error("not a target file: {}; create it again with {TargetToJson}", in_words(.0))]
     Json(serde_json::Error),
     /// The file is of another kind.
     #[error(
@@ -50,7 +50,9 @@ pub enum TargetFileError {
         found: String,
     },
     /// The schema or its version is not supported.
-    #[error("field `schema` is `{found}`, but this version reads `{SCHEMA}`: make the file again")]
+    #[error(
+        "field `schema` is `{found}`, but this version reads `{SCHEMA}`: create the file again"
+    )]
     Schema {
         /// The schema that the file names.
         found: String,
@@ -246,7 +248,7 @@ fn check_identity(target: &Target, stated: Option<Fingerprint>) -> Result<(), Pr
     }
     match &target.plan {
         Some(plan) if plan.labels != found.labels => {
-            problem("plan.labels", "the corners or tags differ from the plan")
+            problem("plan.labels", "the corners or tags differ from those of the planned target")
         }
         Some(plan) if !against_spec::may_be_of_print(target, plan.of_print())? => {
             let what = format!("it is {}, which does not match `spec`", plan.of_print());

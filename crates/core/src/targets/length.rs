@@ -4,7 +4,7 @@ use glam::DVec3;
 const UNITS: [(&str, f64); 5] =
     [("mm", 1.0), ("cm", 10.0), ("in", 25.4), ("pt", 25.4 / 72.0), ("m", 1000.0)];
 
-/// A text that is not a length.
+/// A string that is not a length.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{0}` is not a length (examples: 20mm, 2cm, 0.02m, 0.79in, 57pt)")]
 pub struct LengthError(pub String);
@@ -56,7 +56,7 @@ pub fn parse_box_mm(text: &str) -> Result<DVec3, BoxError> {
     }
 }
 
-/// A text that does not contain three sides.
+/// A string that does not contain three sides.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{0}` is not a box of three sides (example: 200x150x100mm)")]
 pub struct BoxError(pub String);

@@ -132,7 +132,8 @@ pub struct TagPlacement {
 /// tiles in a blurred image. A quarter of an edge is more than the blur at which the corners themselves are lost.
 const QUIET_EDGES: f64 = 0.25;
 
-/// Minimum quiet zone, mm: on fine boards it also separates text from the tiles for the eye.
+/// Minimum quiet zone, mm: on boards with small tiles, it also separates text visually from the
+/// tiles.
 const QUIET_MIN_MM: f64 = 5.0;
 
 /// Panels are coplanar if their normals differ by less than 3° (this is the cosine) and their centres by less than

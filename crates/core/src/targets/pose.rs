@@ -28,8 +28,8 @@ pub struct PanelPose {
     pub covariance: Option<[[f64; 6]; 6]>,
 }
 
-/// Tolerance within which corners count as unrotated, relative to the panel's extent: the rounding of a flat target's
-/// written digits.
+/// Tolerance within which corners count as unrotated, relative to the panel's extent: the rounding
+/// of numbers in the file of a flat target.
 const FLAT: f64 = 1e-9;
 
 /// Second singular value, relative to the first, below which points count as collinear.
@@ -49,7 +49,7 @@ impl PanelPose {
         Self { rotation, translation_mm, covariance: None }
     }
 
-    /// Creates a pose from target_from_panel, with its covariance if it was measured.
+    /// Creates a pose from the motion target_from_panel, with its covariance if it was measured.
     pub fn from_pose(pose: &Pose, covariance: Option<[[f64; 6]; 6]>) -> Self {
         Self { covariance, ..Self::new(DMat3::from_quat(pose.rotation), pose.translation) }
     }

@@ -7,7 +7,7 @@ use crate::targets::Panel;
 
 impl Panel {
     /// Returns the rotations, other than the identity, that map the corners of a panel without tags to its corners
-    /// and its dark tiles to dark tiles. An image cannot distinguish such labels.
+    /// and its dark tiles to dark tiles. An image cannot distinguish these labels.
     ///
     /// A checkerboard of r × c corners has a 180° rotation if r + c is even. A square one with an even number of rows
     /// also has 90° rotations. A deltille has 120° rotations only if its outline has them, like a triangle;

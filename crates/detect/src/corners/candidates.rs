@@ -9,8 +9,8 @@ use multiversion::multiversion;
 use super::ring::{BLOCK, Block, RADIUS, ResponseRow, Threshold};
 use deltille_core::raster::{Gray, bands};
 
-/// Half-width of the window in which a candidate must be the strongest, px. Two corners cannot be closer than the
-/// radius of a ring, so half of it suppresses only echoes.
+/// Half-width of the window in which a candidate must be the strongest, px. Two corners cannot be
+/// closer than the radius of a ring, so half that radius suppresses only duplicates.
 const SUPPRESSION_RADIUS: usize = 2;
 
 /// Number of rows in which a maximum must be the strongest.
@@ -27,8 +27,9 @@ pub(crate) struct Candidate {
     pub response: f32,
 }
 
-/// Returns all local maxima of R above `4.5·min_amplitude²` for corners with N rays, in reading order. `min_amplitude`
-/// is the smallest amplitude |α| of interest in units of the image (values of at most 10 bits).
+/// Returns all local maxima of R above `4.5·min_amplitude²` for corners with N rays, in raster
+/// order. `min_amplitude` is the smallest amplitude |α| of interest in units of the image (values
+/// of at most 10 bits).
 pub(crate) fn candidates<const N: usize>(image: &Gray<i16>, min_amplitude: f32) -> Vec<Candidate> {
     let (width, height) = (image.width(), image.height());
     let margin = RADIUS + SUPPRESSION_RADIUS;
@@ -66,8 +67,9 @@ const MAXIMA_NEAR: usize = 8;
 /// Maximum search distance of [`maxima_near`], px.
 const MAX_REACH: usize = 24;
 
-/// Returns positions around a pixel, within `reach` px in either coordinate, from which a fit may reach a corner. These
-/// are the strongest 3 × 3 maxima of R, of any value. The nearest come first.
+/// Returns positions around a pixel, within `reach` px in either coordinate, from which a fit may
+/// reach a corner. These are the strongest 3 × 3 maxima of R, without a threshold. The nearest come
+/// first.
 pub(crate) fn maxima_near<const N: usize>(
     image: &Gray<i16>,
     place: [usize; 2],
@@ -114,8 +116,8 @@ pub(crate) fn maxima_near<const N: usize>(
     found.into_iter().map(|c| [c.x, c.y]).collect()
 }
 
-/// Returns whether a position of the middle of three rows reaches a threshold, and none of its four neighbours is
-/// stronger.
+/// Returns whether a pixel in the middle of three rows reaches a threshold, and none of its four
+/// neighbours is stronger.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn may_contain_maximum(rows: [&Vec<f32>; 3], places: Range<usize>, threshold: f32) -> bool {
     let part = |row: usize, from: usize| &rows[row][from..from + places.len()];
@@ -150,8 +152,8 @@ fn maxima_of_row(
             continue;
         }
         for (i, response) in places.map(|i| (i, centre[i])) {
-            // Ties go to the later pixel in reading order, so exactly one of equal neighbours remains. Most pixels fall
-            // short of one of their four neighbours.
+            // Ties go to the later pixel in raster order, so exactly one of equal neighbours
+            // remains. Most pixels are weaker than one of their four neighbours.
             let may_be = response > threshold
                 && centre[i - 1].max(above[i]) <= response
                 && centre[i + 1].max(below[i]) < response;
@@ -221,8 +223,8 @@ mod tests {
                 let other = strongest::<6>(&star(sectors));
                 assert!(other < deltille / 8.0, "{sectors} sectors: {other} of {deltille}");
             }
-            // Around a deltille corner, two edges with sectors beside them form weaker candidates, which do not have
-            // four sectors.
+            // Around a deltille corner, two edges with their adjacent sectors form weaker
+            // candidates, which do not have four sectors.
             for (sectors, part) in [(2.0, 0.125), (6.0, 0.75)] {
                 let other = strongest::<4>(&star(sectors));
                 assert!(other < part * checker, "{sectors} sectors: {other} of {checker}");

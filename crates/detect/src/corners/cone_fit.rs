@@ -28,8 +28,8 @@ pub(crate) struct ConeFit<const N: usize> {
     kernels: Vec<[[f32; LANES]; N]>,
 }
 
-/// Singular value below which a design lacks rank. It lies above rounding and below all actual singular values, so no
-/// design lacks rank.
+/// Singular value below which a design matrix is rank-deficient. It lies above rounding errors and
+/// below all actual singular values, so no design matrix is rank-deficient.
 const RANK: f64 = 1e-12;
 
 impl<const N: usize> ConeFit<N> {
@@ -108,7 +108,8 @@ fn products<const N: usize, T: Intensity>(
     sums.each_ref().map(lanes::sum)
 }
 
-/// Returns the sums of half of the lanes, from `first` on, minus `level`. These fit into registers.
+/// Returns the sums of half of the lanes, starting at `first`, minus `level`. These fit into
+/// registers.
 #[inline(always)]
 fn half_sums<const N: usize, T: Intensity>(
     kernels: &[[[f32; LANES]; N]],
@@ -145,8 +146,8 @@ fn half_sums<const N: usize, T: Intensity>(
     sums
 }
 
-/// Returns samples of a row between its pixels, from a column on, minus a level. Beyond the end of the row, where
-/// kernels have no weight, the values are arbitrary.
+/// Returns interpolated samples of a row, starting at a column, minus a level. Beyond the end of
+/// the row, where kernels have no weight, the values are arbitrary.
 #[inline(always)]
 fn blended<T: Intensity>(row: &[T], column: usize, fx: f32, level: f32) -> [f32; HALF] {
     let mut padded = [T::default(); HALF + 1];

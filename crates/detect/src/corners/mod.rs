@@ -3,8 +3,8 @@
 //! Input: the pyramid of an image. Output: corners with the edges that meet there ([`saddles::Saddle`]), not yet
 //! joined.
 //!
-//! 1. `ring` measures how dark and bright alternate around each pixel: three times, or twice on checkerboards.
-//!    `candidates` are the maxima of this measure.
+//! 1. `ring` measures how clearly dark and bright alternate around each pixel: three times, or
+//!    twice on checkerboards. `candidates` are the maxima of this measure.
 //! 2. `polynomial` fits a cubic surface (`cubic`) or a quadric (`quadric`) by fixed kernels (`cone_fit`). It moves to
 //!    the point where all second derivatives, or the gradient, vanish. Unless J < 0, it is not a corner.
 //! 3. `sectors` reads the six or four half-edges with their colours.

@@ -17,8 +17,8 @@ const QUADRIC_ITERATIONS: usize = 20;
 /// Maximum iterations of a first pass, as in the paper.
 const FIND_ITERATIONS: usize = 5;
 
-/// Step length that ends a first pass, px. The remaining error is much smaller. Corners are compared with each other
-/// and with their prediction by tenths of a pixel.
+/// Step length that ends a first pass, px. The remaining error is much smaller. Comparisons of
+/// corners with each other and with predictions have tolerances of tenths of a pixel.
 const FOUND_PX: f64 = 0.03;
 
 /// A fit of one degree in one window.

@@ -9,10 +9,11 @@
 //! ```
 //!
 //! V is the variance of the sums of opposite samples. A monkey saddle is odd about its level, `f(−Δ) = −f(Δ)`, so V is
-//! noise there. An edge that passes beside the centre increases V. Edges through the centre have 9|α|² ≈ |β|², so |α|²
-//! has half the weight that it has in the discriminant. Up to 60° of tilt, corners stay clear of this limit if their
-//! blur is small against the ring, as it is on some level of the pyramid. With twelve samples the third harmonic needs
-//! only additions, and the whole image costs about 3 ns per pixel.
+//! noise there. An edge that passes next to the centre increases V. Edges through the centre have
+//! 9|α|² ≈ |β|², so |α|² has half the weight that it has in the discriminant. Up to 60° of tilt,
+//! corners stay clear of this limit if their blur is small compared with the ring. This is the case
+//! on some pyramid level. With twelve samples the third harmonic needs only additions, and the
+//! whole image costs about 3 ns per pixel.
 //!
 //! A checkerboard corner is even, `f(−Δ) = f(Δ)`. Its α is the second harmonic, and
 //!
@@ -20,10 +21,11 @@
 //!     R = 4.5|α|² − ½V − 9(c − m)²
 //! ```
 //!
-//! Here V is the sum of squared differences of opposite samples, which edges beside the centre cause. A bar across the
-//! ring is even as well, but its centre c differs from the mean m of the ring. At a corner, even with narrow sectors, c
-//! and m agree, because blur makes the centre the mean over all directions. On the middle of a bar they differ by half
-//! of |α| or more. On all but the widest bars they differ by more than the 0.7|α| at which R vanishes.
+//! Here V is the sum of squared differences of opposite samples, which edges next to the centre
+//! cause. A bar across the ring is even as well, but its centre c differs from the mean m of the
+//! ring. At a corner, even with narrow sectors, c and m agree, because blur makes the centre the
+//! mean over all directions. At the middle of a bar, they differ by half of |α| or more. On all but
+//! the widest bars they differ by more than the 0.7|α| at which R vanishes.
 //!
 //! Most of an image has no corners, and values below the threshold need not be computed. Pixels are therefore tested in
 //! blocks. R is at most 4.5|α|². For |α|², the octagon
@@ -32,10 +34,11 @@
 //!     |z| ≤ max(|Re z|, |Im z|) + ½ min(|Re z|, |Im z|)
 //! ```
 //!
-//! is an upper bound, at most 12 % too large, that 16-bit additions compute. If it passes the threshold, a second test
-//! excludes edges by lower bounds of the subtracted terms: β, V or c − m. V is at least half the square of the range of
-//! the values whose variance it is. It is also at least a sixth of the square of Σ|d|, the sum of the six differences
-//! of opposite samples. Only blocks in which some pixel passes both tests are computed, so no corner is missed.
+//! is an upper bound that is at most 12 % too large and needs only 16-bit additions. If it exceeds
+//! the threshold, a second test excludes edges by lower bounds of the subtracted terms: β, V or c −
+//! m. V is at least half the square of the range of the values whose variance it is. It is also at
+//! least a sixth of the square of Σ|d|, the sum of the six differences of opposite samples. Only
+//! blocks in which some pixel passes both tests are computed, so no corner is missed.
 
 #![allow(clippy::needless_range_loop, reason = "one index for all rows, so that vectors show")]
 
@@ -57,7 +60,8 @@ pub(crate) const PER_AMPLITUDE: f32 = 4.5;
 /// Largest offset in [`HALF_RING`], px.
 pub(super) const RADIUS: usize = 4;
 
-/// Pixels per block: a vector of 16-bit numbers. With twice as many, a third more of a photograph would be computed.
+/// Pixels per block: a vector of 16-bit numbers. With twice as many, R would be computed for a
+/// third more pixels of a photograph.
 pub(super) const BLOCK: usize = 16;
 
 /// The minimum R of interest, and the bounds derived from it.
@@ -86,11 +90,11 @@ impl Threshold {
 /// State of a block of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Block {
-    /// Nothing in it reaches the threshold; all values are 0.
+    /// No pixel reaches the threshold; all values are 0.
     Weak,
-    /// Computed, and nothing in it exceeds the threshold.
+    /// Computed; no pixel exceeds the threshold.
     Computed,
-    /// Computed, and something in it exceeds the threshold.
+    /// Computed; some pixel exceeds the threshold.
     Promising,
 }
 
@@ -113,7 +117,7 @@ impl ResponseRow {
         Self { responses: vec![0.0; columns], blocks, flags }
     }
 
-    /// Computes the responses of row `y` from column `x` on.
+    /// Computes the responses of row `y`, starting at column `x`.
     pub(super) fn compute<const N: usize>(
         &mut self,
         image: &Gray<i16>,
@@ -146,7 +150,7 @@ fn odd_row(
     let whole = out.len() / BLOCK;
     let blocks = in_blocks(ring, whole);
     let flags = &mut flags[..whole];
-    // All blocks are tested before any is computed: no branch misprediction, and no test waits.
+    // All blocks are tested before any is computed. This avoids branch mispredictions and stalls.
     for b in 0..whole {
         flags[b] = odd_may_reach(block(&blocks, b), threshold);
     }
@@ -187,7 +191,7 @@ fn odd_may_reach(pixels: Pixels, threshold: Threshold) -> bool {
     may_reach
 }
 
-/// Returns whether the bound passes the threshold at a pixel where no edge makes R negative.
+/// Returns whether the bound exceeds the threshold at a pixel where no edge makes R negative.
 #[inline(always)]
 fn odd_is_not_edge(pixels: Pixels, threshold: Threshold) -> bool {
     let mut may_reach = false;
@@ -201,11 +205,12 @@ fn odd_is_not_edge(pixels: Pixels, threshold: Threshold) -> bool {
             most = most.max(even);
         }
         let alpha = octagon(odd[0] - odd[2] + odd[4], odd[1] - odd[3] + odd[5]);
-        // 6β except for rounding: R < 0 where it is 2.1213 times 6α.
+        // 6β except for rounding: R < 0 where it exceeds 2.1213 times 6α.
         let (d1, d2) = (odd[1] - odd[5], odd[2] + odd[4]);
         let c1 = odd[0] + d1 - (d1 >> 3) + ((odd[2] - odd[4]) >> 1);
         let s1 = odd[3] + d2 - (d2 >> 3) + ((odd[1] + odd[5]) >> 1);
-        // V is at least half the square of the range; R < 0 where the range is 0.7071 of 6α.
+        // V is at least half the square of the range; R < 0 where the range exceeds 0.7071 times
+        // 6α.
         let is_edge = (c1.abs().max(s1.abs()) - 2 > 2 * alpha + (alpha >> 2))
             | (most - least > (alpha >> 1) + (alpha >> 2) + 1);
         may_reach |= (alpha > threshold.odd) & !is_edge;
@@ -278,7 +283,8 @@ fn even_may_reach(pixels: Pixels, threshold: Threshold) -> bool {
     may_reach
 }
 
-/// Returns whether the bound passes the threshold at a pixel where neither an edge nor a bar makes R negative.
+/// Returns whether the bound exceeds the threshold at a pixel where no edge and no bar makes R
+/// negative.
 #[inline(always)]
 fn even_is_not_edge(pixels: Pixels, centres: &[i16; BLOCK], threshold: Threshold) -> bool {
     let mut may_reach = false;
@@ -291,8 +297,8 @@ fn even_is_not_edge(pixels: Pixels, centres: &[i16; BLOCK], threshold: Threshold
         let (e14, e52) = (even[1] - even[4], even[5] - even[2]);
         let s2 = (e14 - e52).abs();
         let alpha = octagon(2 * (even[0] - even[3]) + e14 + e52, 2 * s2 - (s2 >> 2));
-        // V is at least a sixth of the square of `differences`, so R < 0 where they are 0.6124 of 12α. For 12(c − m),
-        // R < 0 where it is 0.7071 of 12α.
+        // V is at least a sixth of the square of `differences`, so R < 0 where they exceed 0.6124
+        // times 12α. For 12(c − m), R < 0 where it exceeds 0.7071 times 12α.
         let sum = even[0] + even[1] + even[2] + even[3] + even[4] + even[5];
         let off = (12 * centres[i] - sum).abs();
         let is_edge = (differences > (alpha >> 1) + (alpha >> 3) + 2)
@@ -338,8 +344,8 @@ fn last_block<'a>(ring: Ring<'a>) -> Option<Pixels<'a>> {
     Some(pixels)
 }
 
-/// Returns the first `count` blocks of each row. (A loop: closures passed to the standard library would not be compiled
-/// for the target, and the lengths would be lost.)
+/// Returns the first `count` blocks of each row. (A loop, because closures passed to the standard
+/// library would not be compiled for the target, and the lengths would not be known.)
 #[inline(always)]
 fn in_blocks<'a>(ring: Ring<'a>, count: usize) -> [[&'a [[i16; BLOCK]]; 2]; 6] {
     let mut blocks: [[&'a [[i16; BLOCK]]; 2]; 6] = [[&[]; 2]; 6];

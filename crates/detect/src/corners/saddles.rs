@@ -20,8 +20,8 @@ const USUAL: usize = 1;
 /// Merging distance, px of the level. Fine and coarse candidates of one corner converge to points closer than this.
 const MERGE_PX: f64 = 1.5;
 
-/// Weakest harmonic that is searched for, of 1023: a contrast of 3 grey levels in 8 bits, where rounding itself begins
-/// to draw shapes.
+/// Weakest harmonic that is searched for, on a scale of 0 to 1023. It is a contrast of 3 grey
+/// levels in 8 bits, at which quantisation begins to produce shapes.
 const MIN_AMPLITUDE: f32 = 6.0;
 
 /// Noise of the harmonic relative to that of a sample: the mean of twelve, times √2.
@@ -30,8 +30,8 @@ const HARMONIC_NOISE: f32 = 0.408;
 /// Factor by which candidates must exceed the noise. At five, one pixel in a million passes.
 const NOISE_FACTOR: f32 = 5.0;
 
-/// Minimum area per corner, px². Tiles of 7 px are the smallest that can be distinguished from waves. Noise has twice
-/// as many candidates.
+/// Minimum area per corner, px². Tiles of 7 px are the smallest that can be distinguished from
+/// waves. Noise produces twice as many candidates.
 const MIN_TILE_PX2: usize = 40;
 
 /// Maximum number of corners in an image: five times as many as are refined.
@@ -58,7 +58,8 @@ pub(crate) struct Saddle<const N: usize> {
 const MAX_BLURRED_CONTRAST: f64 = 0.5;
 
 /// Maximum deviation of the centre of a blurred corner from the level between dark and bright, relative to the contrast
-/// on one of the next [`LEVELS_OF_CONTRAST`]. Ink spread darkens the centre, more so in larger views.
+/// on one of the next [`LEVELS_OF_CONTRAST`]. Ink spread darkens the centre, more so where the
+/// board appears larger.
 const MAX_BLURRED_SHIFT: f64 = 0.3;
 
 /// Number of coarser levels whose contrast counts: all levels of an image whose shorter side is below 2400 px.
@@ -82,7 +83,7 @@ impl<const N: usize> SaddleFinder<N> {
         Self { fits: FIT_RADII.map(|radius| Polynomial::new(kind::<N>(), radius)) }
     }
 
-    /// Returns all saddles of an image, in reading order.
+    /// Returns all saddles of an image, in raster order.
     pub(crate) fn find(&self, pyramid: &Pyramid) -> Vec<Saddle<N>> {
         let (mut noise, mut is_all_noise) = (0.0f32, true);
         let finest = &pyramid.levels()[0];
@@ -138,9 +139,9 @@ impl<const N: usize> SaddleFinder<N> {
         all
     }
 
-    /// Follows a corner from a coarse level to finer ones as long as these show it sharply. If a level shows the
-    /// position sharply and has no corner there, the coarser ones have none either. An example is a thin line beside an
-    /// edge.
+    /// Follows a corner from a coarse level to finer ones as long as these show it sharply. If a
+    /// level shows the position sharply but has no corner there, the corner on the coarser level is
+    /// false, too. An example is a thin line next to an edge.
     fn sharpest(&self, pyramid: &Pyramid, coarse: Saddle<N>, is_stable: bool) -> Option<Saddle<N>> {
         let mut found = coarse;
         while found.level > 0 {
@@ -187,7 +188,7 @@ impl<const N: usize> SaddleFinder<N> {
         let moved = match kind::<N>() {
             // One step is sufficient.
             GridKind::Deltille => wider.step(image.into(), position),
-            // A step of the quadric overshoots where the squares are as narrow as its window.
+            // A step of the quadric overshoots if the squares are no wider than its window.
             GridKind::Checker => {
                 wider.find(image.into(), position).map(|corner| corner.position - position)
             }
@@ -230,7 +231,7 @@ impl<const N: usize> SaddleFinder<N> {
             GridKind::Deltille => &[USUAL],
             GridKind::Checker => &[USUAL, USUAL - 1],
         };
-        // Many starts lead to the same position, which is described once with each fit.
+        // Many starts lead to the same position, which is described only once per fit.
         let mut refused: Vec<(DVec2, usize)> = Vec::new();
         starts.find_map(|start| {
             sizes.iter().find_map(|&size| {
@@ -259,14 +260,15 @@ fn candidates_above_noise<const N: usize>(level: &Gray<i16>, noise: f32) -> Vec<
     /// Number of corners in a grid of 3 × 3.
     const STRONGEST: usize = 9;
     /// Harmonic of the weakest corners of a grid, relative to the ninth strongest. On boards that fill the image under
-    /// uneven light, values from 0 to 0.25 lose none of 32; 0.5 loses three, and 1 loses seven.
+    /// uneven light, values from 0 to 0.25 lose none of 32 boards; 0.5 loses three, and 1 loses
+    /// seven.
     const PART: f32 = 0.25;
     let ninth = |candidates: &[Candidate]| {
         let mut responses: Vec<f32> = candidates.iter().map(|c| c.response).collect();
         (responses.len() >= STRONGEST)
             .then(|| *responses.select_nth_unstable_by(STRONGEST - 1, |a, b| b.total_cmp(a)).1)
     };
-    // Nearly always nine stand clear of the noise, so weak ones need not be searched.
+    // Nearly always, nine candidates clearly exceed the noise, so weak ones are not needed.
     if noise > MIN_AMPLITUDE {
         let found = candidates::<N>(level, noise);
         if ninth(&found).is_some_and(|ninth| PART * PART * ninth >= PER_AMPLITUDE * noise * noise) {
@@ -282,7 +284,7 @@ fn candidates_above_noise<const N: usize>(level: &Gray<i16>, noise: f32) -> Vec<
     found
 }
 
-/// Returns whether an image has more corners than any board would have in it.
+/// Returns whether an image has more corners than any board could show in it.
 pub(crate) fn too_many(pyramid: &Pyramid, corners: usize) -> bool {
     corners > (pyramid.levels()[0].pixels().len() / MIN_TILE_PX2).min(MAX_CORNERS)
 }
@@ -304,8 +306,8 @@ fn strongest(candidates: &mut Vec<Candidate>, count: usize) {
 }
 
 /// Returns whether a level shows a corner blurred; false on the coarsest level and at the border. Blur keeps the centre
-/// at the level between dark and bright. A gap between dots looks like a corner if blur closes it, but has its own
-/// brightness.
+/// at the level between dark and bright. A gap between dots looks like a corner if blur closes it,
+/// but its brightness differs from that level.
 fn is_blurred<const N: usize>(pyramid: &Pyramid, level: usize, position: DVec2) -> bool {
     let contrast = |n: usize| {
         let place = Pyramid::from_level_0(n, position);
@@ -328,7 +330,7 @@ struct Merged<const N: usize> {
     places: Buckets,
 }
 
-/// Returns the distance within which saddles of a level are the same, px of level 0.
+/// Returns the distance within which saddles of a level count as the same, px of level 0.
 pub(crate) fn merge_px(level: usize) -> f64 {
     MERGE_PX * f64::from(1u32 << level)
 }
@@ -379,12 +381,13 @@ pub(crate) fn is_all_noise(image: &Gray<i16>) -> bool {
     sample_noise(image).is_all
 }
 
-/// Noise of the samples of a ring beside corners.
+/// Noise of the samples of a ring away from corners.
 #[derive(Clone, Copy, Debug)]
 struct SampleNoise {
-    /// Standard deviation, of 1023.
+    /// Standard deviation, on a scale of 0 to 1023.
     sigma: f32,
-    /// Whether the image contains only noise: then its strength is known, however large.
+    /// Whether the image contains only noise. Then the strength of the noise is known, however
+    /// large it is.
     is_all: bool,
 }
 
@@ -395,13 +398,14 @@ struct SampleNoise {
 /// The mask vanishes on planes and weakly curved surfaces. It is enlarged so that its nine samples are as far apart as
 /// those of the ring.
 fn sample_noise(image: &Gray<i16>) -> SampleNoise {
-    /// Number of samples that determines the quiet quantile to 3 %.
+    /// Number of samples that suffices to determine the quiet quantile to 3 %.
     const PLENTY: usize = 8000;
     /// Minimum distance between samples, px: the nine samples of the mask are 8 px wide.
     const MIN_STRIDE: usize = 8;
     /// Distance of the mask's samples: the radius of the ring.
     const STEP: usize = 4;
-    /// Fraction of the image that is assumed to be plain: boards and houses leave little without an edge.
+    /// Fraction of the image that is assumed to be plain. Images of boards or houses have few areas
+    /// without edges.
     const QUIET: f64 = 0.1;
     /// σ over that quantile of |x| in Gaussian noise.
     const QUIET_TO_SIGMA: f32 = 1.0 / 0.1257;
@@ -443,7 +447,7 @@ fn sample_noise(image: &Gray<i16>) -> SampleNoise {
         magnitude as f32 + 0.5
     };
     let [quiet, middle, loud] = [QUIET, 0.5, LOUD].map(&mut quantile);
-    // Edges of a board on a twentieth of the image raise the loud quantile by a tenth.
+    // If a board covers a twentieth of the image, its edges increase the loud quantile by a tenth.
     let is_as = |ratio: f32, usual: f32, deviations: f64| {
         f64::from(ratio / usual - 1.0).abs() <= deviations / count.sqrt()
     };

@@ -1,8 +1,9 @@
 //! The edges that meet at a corner, six or four, as directions with a sign.
 //!
-//! The paper takes the polarities from the roots of the cubic or quadratic form. A circle around the corner contains
-//! more information: each of the N half-edges separately, so that perspective and distortion may bend them. It also
-//! proves that dark and bright alternate. The roots of the form are used where the circle is too noisy to read.
+//! The paper takes the polarities from the roots of the cubic or quadratic form. A circle around
+//! the corner contains more information. It shows each of the N half-edges separately, so
+//! perspective and distortion may bend them. It also verifies that dark and bright alternate. The
+//! roots of the form are used if the circle is too noisy.
 //!
 //! ```text
 //!          ray 2   ray 1            rays run counter-clockwise on the print (image angles fall,
@@ -30,8 +31,8 @@ use deltille_core::raster::Gray;
 /// Number of samples on a circle. A sector seen at 75° is 17° wide; steps of 7.5° put two samples into it.
 const SAMPLES: usize = 48;
 
-/// Radii of the circles, px, in the order of trial. Larger circles give better directions. Smaller ones stay clear of
-/// the neighbours on small boards.
+/// Radii of the circles, px, in the order in which they are tried. Larger circles give better
+/// directions. Smaller ones stay clear of the neighbours on small boards.
 const RADII_PX: [f64; 4] = [6.0, 4.5, 8.0, 3.5];
 
 /// Width of the dead band, as a fraction of the largest deviation from the mean. Samples within it count for neither
@@ -47,11 +48,12 @@ const MIN_SECTOR: f64 = 0.3;
 const MAX_BEND_RAD: f64 = 20.0 * PI / 180.0;
 
 /// Maximum deviation of the centre of a checkerboard corner from the mean around it, relative to the amplitude. Blur
-/// makes the centre that mean. If ink spreads or squares stop short, the centre may be dark or bright, off by the
-/// amplitude. A bar across the circle looks like a corner there, but its centre is off by up to twice the amplitude.
+/// makes the centre that mean. If ink spreads or the squares do not quite meet, the centre may be
+/// dark or bright. It is then off by the amplitude. On the circle, a bar looks like a corner, but
+/// its centre is off by up to twice the amplitude.
 const MAX_CENTRE: f64 = 1.2;
 
-/// Iterations of the search for the level between two classes of unequal size; it settles in two.
+/// Iterations of the search for the level between two classes of unequal size; it converges in two.
 const LEVEL_STEPS: usize = 4;
 
 /// Directions and brightness around a corner.
@@ -131,7 +133,8 @@ impl<const N: usize> Circle<N> {
         Some(Self { level, deviations: values.map(|v| v - level), centre })
     }
 
-    /// Returns whether the centre may belong to a corner. Odd corners have already passed by their oddness.
+    /// Returns whether the centre may belong to a corner. Deltille corners need no such test,
+    /// because their odd symmetry has already been tested.
     fn has_its_mean_in_the_middle(&self) -> bool {
         match kind::<N>() {
             GridKind::Deltille => true,
@@ -150,7 +153,8 @@ impl<const N: usize> Circle<N> {
 
     /// Returns whether the sectors between given rays are alternately dark and bright, on average.
     fn alternates(&self, rays: &[f64; N]) -> bool {
-        // Angles of the other rays behind the first; rays run against the samples.
+        // Angles by which the rays lie behind the first. Rays and samples run in opposite
+        // directions.
         let behind = rays.map(|ray| in_one_turn(rays[0] - ray));
         let (mut sums, mut counts) = ([0.0; N], [0.0; N]);
         for (k, deviation) in self.deviations.iter().enumerate() {
@@ -173,7 +177,7 @@ impl<const N: usize> Circle<N> {
     fn crossings(&self) -> Option<[Crossing; N]> {
         let dead = DEAD_BAND * largest(&self.deviations);
         let clear = bits(&self.deviations, |d| d.abs() > dead);
-        // Nearly all false corners end here.
+        // Nearly all false corners are rejected here.
         if changes(clear, bits(&self.deviations, |d| d > 0.0)) != N as u32 {
             return None;
         }
@@ -274,7 +278,8 @@ fn bits(values: &[f64; SAMPLES], is: impl Fn(f64) -> bool) -> u64 {
     values.iter().enumerate().fold(0, |bits, (k, &value)| bits | u64::from(is(value)) << k)
 }
 
-/// Returns how often, around the circle, a clear sample is on another side than the previous clear one.
+/// Counts the clear samples around the circle that are on the other side of the level than the
+/// previous clear one.
 fn changes(clear: u64, above: u64) -> u32 {
     let next = |bits: u64, by: usize| (bits << by | bits >> (SAMPLES - by)) & EVERY;
     let (mut known, mut sides) = (clear, clear & above);
@@ -308,7 +313,7 @@ fn largest(values: &[f64; SAMPLES]) -> f64 {
     parts[0].max(parts[1]).max(parts[2].max(parts[3]))
 }
 
-/// Returns an angle between 0 and 2π; most need no division.
+/// Reduces an angle to the range 0 to 2π; most angles need no division.
 fn in_one_turn(angle: f64) -> f64 {
     if (0.0..TAU).contains(&angle) {
         angle
@@ -389,8 +394,8 @@ fn ordered_rays<const N: usize>(crossings: &[Crossing; N]) -> Option<[f64; N]> {
     if !straight {
         return None;
     }
-    // Falling image angle is counter-clockwise on the print. In that direction, a crossing that rises with the angle
-    // leads from bright to dark: its counter-clockwise sector is dark.
+    // Decreasing image angles are counter-clockwise on the print. In that direction, a crossing
+    // that rises with the angle leads from bright to dark: its counter-clockwise sector is dark.
     let start = crossings.iter().position(|c| c.rising)?;
     Some(std::array::from_fn(|k| crossings[(start + N - k) % N].angle))
 }
@@ -398,7 +403,7 @@ fn ordered_rays<const N: usize>(crossings: &[Crossing; N]) -> Option<[f64; N]> {
 /// Returns the angle from `from` to `to`, −π to π.
 pub(crate) fn turn(from: f64, to: f64) -> f64 {
     let turn = to - from;
-    // Most angles are in range without a division: if the angle is less than 3π, one full turn suffices.
+    // Most angles need no division: for an angle below 3π, one full turn suffices.
     let turn = if turn.abs() < 3.0 * PI { turn } else { turn.rem_euclid(TAU) };
     if turn > PI {
         turn - TAU
@@ -488,7 +493,7 @@ mod tests {
         assert_eq!(changes(0, EVERY), 0);
         assert_eq!(changes(EVERY, 0b1111), 2);
         assert_eq!(changes(EVERY, 1 << 47 | 1), 2);
-        // A gap takes the side of the sample before it, regardless of its own value.
+        // A gap takes the side of the sample before it, regardless of the value in the gap.
         assert_eq!(changes(EVERY & !0b1110, 0b0101), 2);
         assert_eq!(changes(1 | 1 << 20 | 1 << 40, 1 << 20), 2);
         assert_eq!(changes(1 | 1 << 20 | 1 << 30 | 1 << 40, 1 << 20 | 1 << 40), 4);

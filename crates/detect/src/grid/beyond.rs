@@ -1,9 +1,10 @@
 //! Tests whether a pattern continues beyond the end of a grid.
 //!
-//! A board ends: beyond its last squares lies paper, a table, or a cover, and none of these follows the board's rows
-//! and columns. A screen of dots, a dither, a moiré or a field of random cells shows checkerboard corners only where
-//! its dots happen to meet. Elsewhere its dots and gaps continue at the same pitch. The test reads two rows of squares
-//! beyond every end of a grid. It counts the pairs of neighbours in a row that differ like black and white.
+//! A board ends: beyond its last squares lies paper, a table, or an occluder, and none of these
+//! follows the board's rows and columns. A screen of dots, a dither, a moiré or a field of random
+//! cells shows checkerboard corners only where its dots happen to meet. Elsewhere its dots and gaps
+//! continue at the same pitch. The test reads two rows of squares beyond every end of a grid. It
+//! counts the pairs of neighbours in a row that differ like black and white.
 //!
 //! ```text
 //!     ░░ ██ ░░ ██        ·  ·  ·  ·         squares of a grid (left), and what is beyond
@@ -29,7 +30,8 @@ use deltille_core::raster::Gray;
 /// Maximum fraction of pairs of squares beyond a board that differ like black and white.
 const MAX_DIFFERENT: f64 = 0.2;
 
-/// The same beyond rows of corners that are not an area, which random cells form more easily.
+/// The same for grids that are rows of corners instead of an area. Random cells form rows more
+/// easily.
 const MAX_DIFFERENT_ROWS: f64 = 0.08;
 
 /// The same beyond the complete squares of a grid. Single corners that stand apart may be the rest of a covered board,
@@ -74,8 +76,9 @@ pub(crate) fn go_on(image: &Gray<i16>, grids: &[&Grid]) -> Vec<bool> {
 }
 
 impl CheckerTiles<'_> {
-    /// Returns whether more than a fraction `most` of the squares beyond alternates. `is_others` returns whether a
-    /// corner of another grid is within a distance of a position, px.
+    /// Returns whether at least a fraction `most` of the pairs of squares beyond the ends
+    /// alternates. `is_others` returns whether a corner of another grid is within a distance of a
+    /// position, px.
     fn goes_on(&self, is_others: impl Fn(Point, f64) -> bool, most: f64) -> bool {
         let Some([even, odd]) = self.levels() else {
             return false;

@@ -10,8 +10,8 @@ use deltille_core::lattice::Vertex;
 use deltille_core::raster::ImageView;
 use deltille_core::statistics::median;
 
-/// Offset of the samples from the centre of a square along rows and columns, in edges. It fits on a dot much smaller
-/// than its square, too.
+/// Offset of the samples from the centre of a square along rows and columns, in edges. The samples
+/// fit even on a dot that is much smaller than its square.
 const AROUND: f64 = 0.12;
 
 /// Minimum number of whole squares, relative to a square board with as many corners. A grid with fewer consists of rows
@@ -97,7 +97,8 @@ impl<'a> CheckerTiles<'a> {
         })
     }
 
-    /// Returns whether there are as many whole squares as in an area without holes; false for rows of corners.
+    /// Returns whether the number of whole squares is that of an area without holes; false for rows
+    /// of corners.
     pub(crate) fn is_compact(&self) -> bool {
         let square = (self.corners.len() as f64).sqrt() - 1.0;
         self.whole_squares().count() as f64 >= COMPACT * square * square
@@ -115,7 +116,7 @@ impl<'a> CheckerTiles<'a> {
 
     /// Returns the brightness about the centre of a square; `None` outside the image.
     pub(crate) fn value(&self, Square { middle, edges }: Square) -> Option<f64> {
-        /// In edges: the centre, and points beside it along rows and columns.
+        /// In edges: the centre, and points next to it along rows and columns.
         const POSITIONS: [[f64; 2]; 5] =
             [[0.0, 0.0], [AROUND, 0.0], [-AROUND, 0.0], [0.0, AROUND], [0.0, -AROUND]];
         let values = POSITIONS.map(|place| self.brightness(moved(middle, edges, place.into())));

@@ -29,7 +29,8 @@ const SQUARE_SIDE: f64 = 0.04;
 /// Minimum distance of the samples from the edge, px of the level.
 const MIN_SIDE_PX: f64 = 1.2;
 
-/// Sine between this edge and the next edges of a tile below which the samples do not follow the slant of the tile.
+/// Sine of the angle between this edge and the next edges of a tile, below which the samples do not
+/// follow the slant of the tile.
 const MIN_ACROSS: f64 = 0.1;
 
 /// Minimum deviation of a sample from the level, relative to the amplitude of the corners.
@@ -75,7 +76,7 @@ pub(crate) fn is_clean_somehow<const N: usize>(
     shapes.into_iter().any(|shape| is_clean_along(pyramid, from, to, shape))
 }
 
-/// Slopes of an edge against its chord at either end.
+/// Slopes of an edge relative to its chord at either end.
 type Slopes = [f64; 2];
 
 /// Tests an edge like [`is_clean`]. Its slopes follow from those of the rays.
@@ -92,7 +93,7 @@ fn is_clean_along<const N: usize>(
     let way = Pyramid::from_level_0(level, b.position) - from;
     let length = way.x.hypot(way.y);
     let chord = way.to_angle();
-    // Slopes of the curve against its chord at the two ends.
+    // Slopes of the curve relative to its chord at the two ends.
     let start = turn(chord, a.sectors.rays[i]).tan();
     let end = turn(chord + std::f64::consts::PI, b.sectors.rays[j]).tan();
     let [start, end] = shape([start, end]);

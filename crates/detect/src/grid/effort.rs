@@ -1,8 +1,8 @@
 //! Budget for searches in an image. The time for candidates and links grows with the number of pixels. Searches around
 //! every grid and between grids would take minutes in an image made only of patterns.
 
-/// Maximum number of searches per image, some microseconds each: some hundred times as many as photographs of boards
-/// take, and about a second.
+/// Maximum number of searches per image, a few microseconds each. They take about a second, and are
+/// about a hundred times as many as photographs of boards need.
 const MAX_PASSES: usize = 200_000;
 
 /// Remaining searches for an image.

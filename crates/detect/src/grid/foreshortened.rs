@@ -1,8 +1,9 @@
 //! Detects boards at a grazing angle in images that are compressed along their tiles.
 //!
-//! From 75° on, a tile is four times as wide as it is high, and its sectors are 15° wide. A circle around a corner that
-//! shows them leaves the tile. The image is compressed to half its width, along one of a few directions. In the
-//! direction nearest to that of the tiles, they look as at 60° or 65°.
+//! From 75° on, a tile is four times as wide as it is high, and its sectors are 15° wide. A circle
+//! that is large enough to show them extends beyond the tile. The image is compressed to half its
+//! width, along one of a few directions. In the direction nearest to that of the tiles, they appear
+//! as if seen at 60° or 65°.
 //!
 //! ```text
 //!     ╲▁▁▁▁▁▁╱▔▔▔▔▔▔╲▁▁▁▁▁▁╱        ╲▁▁╱▔▔╲▁▁╱
@@ -38,7 +39,7 @@ const SLACK_PX: f64 = 0.1;
 /// pixels.
 const LEVEL_STEP: f64 = 1e-9;
 
-/// Value outside the image, of 1023: neither dark nor bright.
+/// Value outside the image, on a scale of 0 to 1023: neither dark nor bright.
 const OUTSIDE: i16 = 512;
 
 /// Returns the grids of the direction in which the largest is seen, in px of level 0.
@@ -99,8 +100,8 @@ impl View {
         DVec2::new(there.x, there.y)
     }
 
-    /// Renders the image as the view shows it, grey outside. (A pyramid level is smooth enough to be sampled at every
-    /// second pixel.)
+    /// Renders the image as the view shows it, with grey outside the image. (A pyramid level is
+    /// smooth enough to be sampled at every second pixel.)
     fn drawn(&self, image: &Gray<i16>) -> Gray<i16> {
         // The last position has a pixel behind it.
         let last = [image.width(), image.height()].map(|side| side as f64 - (2.0 + SLACK_PX));

@@ -19,10 +19,10 @@ use deltille_core::raster::Pyramid;
 /// Maximum distance of a missing corner from its predicted position, as a fraction of the edge length there.
 const MAX_SURPRISE: f64 = 0.2;
 
-/// Effort for a missing corner, which is searched in the image and in several rectified views of it.
+/// Effort of a search for a missing corner in the image and in several rectified views of it.
 const LOOKS_FOR_CORNER: usize = 20;
 
-/// Searches for corners at empty vertices beside those of a grid, within it and around it, until no more are found.
+/// Searches for corners at the empty vertices within a grid and around it, until no more are found.
 pub(super) fn fill_gaps<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
@@ -95,7 +95,7 @@ fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<Predicte
     if count >= 2.0 {
         return Some(Predicted { position: sum / count, edge_px: edge / count });
     }
-    // The seed of a grid has no rows yet, but two of its corners beside the vertex.
+    // The seed of a grid has no rows yet, but has two corners next to the vertex.
     let beside: Vec<DVec2> = neighbours::<N>(vertex).into_iter().filter_map(at).collect();
     let map = (beside.len() >= 2).then(|| LocalMap::about::<N>(vertex, at, Bend::usual()))??;
     let px = |p: &DVec2| (p.x - map.place.x).hypot(p.y - map.place.y);
@@ -103,8 +103,8 @@ fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<Predicte
     Some(Predicted { position: map.place, edge_px })
 }
 
-/// Returns the corner at `vertex`, if one is found near its prediction. It is searched in the image, and for a board at
-/// a steep angle in a view rectified by the edges to its neighbours.
+/// Returns the corner at `vertex`, if one is found near its prediction. The search uses the image.
+/// For a board at a steep angle, it uses a view rectified by the edges to the neighbours.
 fn corner_near<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,

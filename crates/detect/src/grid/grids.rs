@@ -21,9 +21,9 @@ use deltille_core::raster::Pyramid;
 /// motion, a corner may be detected twice.
 const SAME_PART: f64 = 0.2;
 
-/// Returns all grids among the saddle points, by lattice vertex, the largest first. The result is empty if there are
-/// more saddle points than on any board. Missing corners are searched in gaps of a grid and around it. If a grid shows
-/// the `whole` board, they are not searched.
+/// Returns all grids among the saddle points, by lattice vertex, the largest first. The result is
+/// empty if there are more saddle points than any board has. Gaps of a grid and its surroundings
+/// are searched for missing corners, unless a grid shows the `whole` board.
 pub(crate) fn grids<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
@@ -181,7 +181,8 @@ mod tests {
         (0..side).flat_map(|row| (0..side).map(move |col| corner(row, col))).collect()
     }
 
-    /// Cells of a tag lie in one tile of the grid around them. A grid beside another, or across its edges, stays.
+    /// Cells of a tag lie in one tile of the grid around them. A grid beside another, or across its
+    /// edges, is kept.
     #[test]
     fn only_grids_within_one_tile_of_a_larger_grid_are_dropped() {
         fn check<const N: usize>(kind: GridKind) {

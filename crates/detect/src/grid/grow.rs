@@ -2,12 +2,13 @@
 //!
 //! A corner has N rays, six or four, along the edges that meet there. It is *linked* along a ray to the corner at the
 //! other end of the edge. In a grid, it has a lattice vertex and a *turn*: its ray k points along step `k + turn` (mod
-//! N) of the lattice ([`step`]). Rays with even numbers begin dark sectors. On a deltille grid turns are therefore
-//! even, and the upright tiles are the dark ones for any colours of the board. On a checkerboard, the turn is even
-//! where row + column is, and the square up and right of such a corner is dark.
+//! N) of the lattice ([`step`]). Rays with even numbers begin dark sectors. On a deltille grid,
+//! turns are therefore even, and the upright tiles are the dark ones, even on inverted boards. On a
+//! checkerboard, the turn is even where row + column is even, and the square to the upper right of
+//! that corner is dark.
 //!
-//! Every grid has a lattice frame of its own, known up to a motion of the lattice. [`label`](crate::labels::placement)
-//! locates it on the target.
+//! Every grid has a separate lattice frame, which is known up to a motion of the lattice.
+//! [`label`](crate::labels::placement) locates it on the target.
 
 use std::collections::{HashSet, VecDeque};
 
@@ -36,7 +37,8 @@ pub(super) struct Placed {
 /// The four corners from which a grid grows.
 pub(super) type Seed = [Placed; 4];
 
-/// Returns all seeds, those whose corners have most links first, because links are missing near errors.
+/// Returns all seeds. Seeds whose corners have the most links come first, because links are missing
+/// near errors.
 ///
 /// ```text
 ///     D ───── C          A at (0,0), B at (0,1), C at (1,0), D at (1,−1): the two tiles A B C and
@@ -119,9 +121,10 @@ impl<'a, const N: usize> Growth<'a, N> {
 
     /// Grows a grid from a seed, breadth first, and returns its corners with their positions.
     ///
-    /// A corner joins when it closes a tile, because a single link may be wrong. It closes a triangle, or a square in a
-    /// re-entrant angle of the grid, when two corners of the grid agree on its position. On a straight side of a
-    /// checkerboard, two new corners close a square together.
+    /// A corner joins when it closes a tile, because a single link may be wrong. It closes a
+    /// triangle, or a square at a concave corner of the grid's outline, when two corners of the
+    /// grid agree on its position. On a straight side of a checkerboard, two new corners close a
+    /// square together.
     pub(super) fn grow(&mut self, seed: &Seed) -> Vec<Placed> {
         self.occupied.clear();
         seed.iter().for_each(|&placed| self.add(placed));
@@ -174,13 +177,13 @@ impl<'a, const N: usize> Growth<'a, N> {
     /// Adds a corner, and follows the links of its neighbours in the grid once more.
     fn join(&mut self, next: Placed) {
         self.add(next);
-        // Corners beside it that lacked one vote may now have it.
+        // Neighbouring corners that lacked one vote may now have it.
         let linked = (0..N).filter_map(|k| follow(self.links, next, k)).map(|next| next.corner);
         self.queue.extend(linked.filter(|&corner| self.places[corner].is_some()));
     }
 
-    /// Adds the corner that follows `at` along step `k` together with one beside it, if these two close a square with
-    /// an edge of the grid.
+    /// Adds the corner that follows `at` along step `k`, together with a neighbour, if these two
+    /// close a square with an edge of the grid.
     fn join_by_square(&mut self, at: Placed, k: usize) {
         for side in [k + 1, k + N - 1] {
             let Some([_, next, beside, known]) = square(self.links, at, k, side % N) else {
@@ -239,8 +242,8 @@ mod tests {
         links
     }
 
-    /// Grids are parts of the lattice, rotated and shifted. No corner has two positions, and no position two corners.
-    /// Without holes there is one grid of all corners.
+    /// Grids are parts of the lattice, rotated and shifted. No corner has two positions, and no
+    /// position has two corners. Without holes there is one grid of all corners.
     fn grids_are_the_lattice<const N: usize>(holes: &[bool], lost: &[bool], seed: usize) {
         let mut vertices: Vec<Vertex> = (0..49)
             .map(|i| Vertex::new(i / 7, i % 7))

@@ -12,14 +12,14 @@ use deltille_core::raster::Pyramid;
 /// many unrelated ones.
 const NEAREST: usize = 36;
 
-/// Squared cosine below that of [`MAX_CHORD_RAD`].
+/// Lower bound of the squared cosine of [`MAX_CHORD_RAD`].
 const MIN_ALONG: f64 = 0.9;
 
-/// Number of corners that are tested first; inside a board it is sufficient.
+/// Number of corners that are tested first; inside a board, they suffice.
 const FIRST: usize = 12;
 
-/// Maximum ratio of the contrasts of neighbouring corners. Light falls off slowly, and weaker corners are noise on the
-/// paper beside the board.
+/// Maximum ratio of the contrasts of neighbouring corners. Illumination falls off slowly, and
+/// weaker corners are noise on the paper around the board.
 pub(crate) const MAX_CONTRAST_RATIO: f64 = 3.0;
 
 /// The far end of an edge: a corner, and its ray that points back.
@@ -116,8 +116,8 @@ impl<const N: usize> Corners<'_, N> {
 
 /// Returns the ray of `b` that points back along ray `i` of `a`; `None` if they do not face each other.
 ///
-/// Opposite ends of an edge see its dark side on opposite hands, so the rays differ in parity. Their contrasts are
-/// similar.
+/// Seen from its two ends, an edge has its dark side on opposite sides, so the rays differ in
+/// parity. Their contrasts are similar.
 pub(crate) fn facing_ray<const N: usize>(a: &Saddle<N>, i: usize, b: &Saddle<N>) -> Option<usize> {
     let chord = chord_rad(a, b);
     (have_similar_contrast(a, b) && is_along(a, i, chord)).then(|| ray_back(chord, i, b)).flatten()

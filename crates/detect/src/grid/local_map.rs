@@ -19,8 +19,8 @@ use nalgebra::{Matrix6, Vector6};
 use crate::tiling::kind;
 use deltille_core::lattice::{GridKind, Vertex};
 
-/// Standard deviation of the second derivatives, in edges, of a grid that shows none. Over one tile, a steep view or a
-/// wide lens changes the next edge by this much (1σ).
+/// Standard deviation of the second derivatives, in edges, of a grid that shows no bend. Over one
+/// tile, a steep view or a wide lens changes the next edge by this much (1σ).
 const TYPICAL_BEND: f64 = 0.1;
 
 /// Weight of [`TYPICAL_BEND`] in lines of three corners.
@@ -29,7 +29,8 @@ const TYPICAL_WEIGHT: f64 = 0.25;
 /// Information, in edges⁻², that is less than a billionth of that of a corner.
 const NO_PRIOR: f64 = 1e-9;
 
-/// Standard deviation of a corner from the smooth map, px of its level: fits are not less accurate.
+/// Standard deviation of a corner from the smooth map, px of its level. Fits are at least this
+/// accurate.
 const PLACE_PX: f64 = 0.3;
 
 /// Maximum number of fitted corners. Further ones are farther away and contribute little.
@@ -142,7 +143,7 @@ impl LocalMap {
         }
         let solver = normal.cholesky()?;
         let [x, y] = right.map(|right| edge_px * solver.solve(&right));
-        // For collinear corners, only the prior determines the map beside the line.
+        // For collinear corners, only the prior determines the map away from the line.
         let mut unit = Vector6::zeros();
         unit[0] = 1.0;
         let variance = solver.solve(&unit)[0];
@@ -213,7 +214,7 @@ mod tests {
             let map = LocalMap::about::<6>(vertex, known, bend(known)).unwrap();
             let off = map.distance::<6>(seen(vertex)).unwrap();
             assert!(off < 2.0 * map.sigma, "{off} at {beyond}, σ {}", map.sigma);
-            // Uncertainty by the bend grows with the square of the distance.
+            // Uncertainty due to the bend grows with the square of the distance.
             assert!(map.sigma < 0.06 * f64::from(beyond).powi(2), "σ {} at {beyond}", map.sigma);
         }
     }

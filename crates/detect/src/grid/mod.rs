@@ -6,11 +6,13 @@
 //! 1. `links` joins corners along clean edges (`edge`) in their neighbourhood (`neighbours`).
 //! 2. `grow` starts from four corners and grows tile by tile. `gaps` searches for missing corners; where tiles are
 //!    narrow, it searches in the frame of their neighbours (`rectified`). `effort` limits the searches per image.
-//! 3. `parts` joins parts on both sides of a cover, where the map of a grid (`local_map`) continues.
+//! 3. `parts` joins parts on both sides of an occluder, where the map of a grid (`local_map`)
+//!    continues.
 //! 4. `grids` runs these, and removes duplicates and grids of the cells of tags.
 //! 5. `foreshortened` repeats all of it in images compressed along the tiles, for boards at a grazing angle.
-//! 6. `outline` fits a board that is seen whole. `beyond` rejects untagged checkerboards whose pattern continues beyond
-//!    their end, `tile_shape` those whose tiles (`checker_tiles`) are not squares.
+//! 6. `outline` fits an entirely visible board. `beyond` rejects untagged checkerboards whose
+//!    pattern continues beyond their end, `tile_shape` those whose tiles (`checker_tiles`) are not
+//!    squares.
 
 pub(crate) mod beyond;
 pub(crate) mod checker_tiles;

@@ -1,4 +1,4 @@
-//! Rows and columns of an untagged board that is seen whole, from its outline.
+//! Rows and columns of an entirely visible untagged board, from its outline.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -40,8 +40,8 @@ impl WholeBoard {
     }
 }
 
-/// Returns the motion that maps a whole grid exactly onto an outline, if exactly one does. `inverted` boards show their
-/// upright tiles bright, so they are rotated by 180°.
+/// Returns the motion that maps a whole grid exactly onto an outline, if exactly one does. The
+/// upright tiles of `inverted` boards are bright, so these boards are rotated by 180°.
 pub(crate) fn fit_outline(
     grid: &SaddleGrid,
     outline: &BTreeSet<Vertex>,
@@ -81,8 +81,8 @@ pub(crate) fn fit_rectangle(
     if grid.len() as i64 != i64::from(rows) * i64::from(cols) {
         return None;
     }
-    // Quarter rotations of the labels against the grid's rows and columns: (0, 0) is then at the lower left, lower
-    // right, upper right or upper left of the grid.
+    // Quarter rotations of the labels relative to the grid's rows and columns: (0, 0) is then at
+    // the lower left, lower right, upper right or upper left of the grid.
     let fitting = (0..4u8).filter(|rotations| {
         size == if rotations.is_multiple_of(2) { (rows, cols) } else { (cols, rows) }
     });

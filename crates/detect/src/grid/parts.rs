@@ -1,9 +1,10 @@
 //! Joins the parts of a partly covered board through the local map of one part.
 //!
-//! A finger over a board leaves grids that no link joins, and single corners without a completely visible tile. The
-//! local map of a grid ([`LocalMap`]) predicts where its lattice continues behind the finger. A corner there belongs to
-//! the board if it lies at a vertex and all its edges have the predicted directions and dark sides. A grid belongs to
-//! the same board if all its corners that are near enough do.
+//! A finger over a board splits it into grids that no link joins, and single corners without a
+//! completely visible tile. The local map of a grid ([`LocalMap`]) predicts where its lattice
+//! continues behind the finger. A corner there belongs to the board if it lies at a vertex and all
+//! its edges have the predicted directions and dark sides. A grid belongs to the same board if all
+//! its corners that are near enough do.
 
 use std::collections::BTreeMap;
 
@@ -25,18 +26,19 @@ use deltille_core::raster::Pyramid;
 /// nothing.
 const MAX_REACH: f64 = 4.0;
 
-/// Mean length of edges beyond a grid that approaches the camera, at most, relative to the longest edge of the grid.
+/// Maximum mean length of the edges beyond a grid that approaches the camera, relative to the
+/// longest edge of the grid.
 const NEARER: f64 = 2.0;
 
-/// Maximum standard deviations of a predicted position, in edges, in the order of trial: reliable corners improve the
-/// predictions of the rest. Within 3σ at the largest, a position is nearer to its vertex than to anything else in a
-/// tile.
+/// Maximum standard deviations of a predicted position, in edges, in the order in which they are
+/// tried: reliable corners improve the predictions of the rest. Within 3σ at the largest, a
+/// position is nearer to its vertex than to anything else in a tile.
 const SIGMAS: [f64; 3] = [0.02, 0.04, 0.08];
 
 /// Maximum distance of a corner from its predicted position, in standard deviations.
 const MAX_SIGMAS: f64 = 3.0;
 
-/// At least one in so many edges to neighbours must be visible.
+/// At least one in this many edges to neighbours must be visible.
 const MAX_COVERED: usize = 3;
 
 /// Minimum number of corners of a grid that predicts others; an initial quad has four.
@@ -108,7 +110,7 @@ impl<const N: usize> Joining<'_, N> {
         let Self { pyramid, saddles, grids, owners, effort, .. } = self;
         let mut adopted = false;
         for &(index, vertex) in candidates {
-            // The nearest corner of the grid is searched among all.
+            // The search for the nearest corner of the grid visits all of its corners.
             if !effort.spend(1 + grids[base].len() / CORNERS_IN_A_LOOK) {
                 break;
             }
@@ -243,7 +245,7 @@ fn belongs<const N: usize>(
 }
 
 /// Returns whether a corner is connected to its neighbours in a grid: some of the edges between them are visible, if
-/// there are neighbours. Between separate dots, none is.
+/// there are neighbours. Between separate dots, no edge is visible.
 fn is_joined<const N: usize>(
     pyramid: &Pyramid,
     grid: &Growing<N>,
@@ -277,8 +279,8 @@ fn contrast_near<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<f6
     Some(nearest.1.saddle.sectors.amplitude)
 }
 
-/// Returns whether a part, moved by a lattice map, continues a grid: no vertex is in both, and each of its corners is
-/// at its predicted position, as far as there is a prediction.
+/// Returns whether a part, moved by a lattice map, continues a grid: no vertex is in both, and each
+/// of its corners for which there is a prediction is at its predicted position.
 fn is_part<const N: usize>(
     grid: &Growing<N>,
     part: &Growing<N>,

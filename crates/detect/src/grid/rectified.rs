@@ -1,8 +1,9 @@
 //! Finds a corner in the frame of its neighbours.
 //!
-//! Near the edge of a fisheye image, tiles become strips a few pixels wide that meet at 15°. No circle around such a
-//! corner shows only its sectors. Its neighbours predict two edges. The image is resampled so that these have the
-//! lengths and the angle of the print. The corner then looks like any other.
+//! Near the edge of a fisheye image, tiles become strips a few pixels wide that meet at 15°. No
+//! circle around a corner of these tiles shows only the sectors of that corner. Its neighbours
+//! predict two edges. The image is resampled so that these have the lengths and the angle of the
+//! print. The corner then looks like any other.
 //!
 //! ```text
 //!      ╱░░╱██╱                          ░░│██
@@ -19,19 +20,21 @@ use crate::corners::saddles::{Saddle, SaddleFinder};
 use crate::corners::sectors::Sectors;
 use deltille_core::raster::{Gray, Pyramid};
 
-/// Lengths of an edge in the patch, px, in the order of trial. The widest fit of the finder reaches 8 px and stays
-/// within the tiles around the corner. The usual fit stays within the area that tags leave clear on a longer edge.
+/// Lengths of an edge in the patch, px, in the order in which they are tried. The widest fit of the
+/// finder reaches 8 px and stays within the tiles around the corner. The usual fit stays within the
+/// area that tags leave clear on a longer edge.
 const EDGES_PX: [f64; 2] = [16.0, 28.0];
 
-/// Maximum distance of a corner from its predicted position, as a fraction of an edge. If tiles shrink to a third from
-/// one to the next, evenly continued rows are off by as much, and still no other corner is nearer.
+/// Maximum distance of a corner from its predicted position, as a fraction of an edge. If each tile
+/// is a third as large as the previous one, extrapolated rows are off by this much, and still no
+/// other corner is nearer.
 const MAX_WAY: f64 = 0.5;
 
 /// Reach of the widest fit, px.
 const FIT_REACH_PX: f64 = 9.0;
 
-/// Minimum ratio of the axes of a view. A smaller one shows nothing that the image does not show as well: sectors seen
-/// at 45° are still 40° wide.
+/// Minimum ratio of the axes of a view. A view with a smaller ratio shows nothing that the image
+/// does not show, too: sectors seen at 45° are still 40° wide.
 const MIN_STRETCH: f64 = 1.5;
 
 /// An affine view of the surroundings of a position.
@@ -42,9 +45,9 @@ pub(crate) struct Rectified {
 }
 
 impl Rectified {
-    /// Returns the views around `place`, smaller and larger, that set two edges as on the print. These are edge `k` of
-    /// the lattice, seen along `edges[0]`, and the next one counter-clockwise, along `edges[1]`. Returns `None` if they
-    /// are collinear.
+    /// Returns the views around `place`, smaller and larger, in which two edges have the lengths
+    /// and the angle of the print. These are edge `k` of the lattice, seen along `edges[0]`, and
+    /// the next one counter-clockwise, along `edges[1]`. Returns `None` if they are collinear.
     pub(crate) fn views<const N: usize>(
         place: DVec2,
         k: usize,
@@ -71,8 +74,8 @@ impl Rectified {
         (image_from_patch.determinant() > 0.0).then_some(Self { place, edge_px, image_from_patch })
     }
 
-    /// Returns whether the patch shows more than a level of the pyramid on its own: tiles that are narrow there, or too
-    /// small.
+    /// Returns whether the patch shows more than a level of the pyramid: tiles that are narrow or
+    /// too small on that level.
     fn shows_more(&self, level: usize) -> bool {
         let axes = self.image_from_patch.singular_values() / f64::from(1u32 << level);
         axes[1] < 1.0 || axes[0] > MIN_STRETCH * axes[1]
@@ -91,7 +94,7 @@ impl Rectified {
             return None;
         }
         let image = &pyramid.levels()[level];
-        // That reach, and the displacement.
+        // The search needs that reach plus the displacement.
         let way_px = MAX_WAY * self.edge_px;
         let half_side = (FIT_REACH_PX + way_px) as usize + 1;
         let centre = DVec2::splat(half_side as f64);

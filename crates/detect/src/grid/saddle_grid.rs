@@ -25,7 +25,7 @@ pub(crate) fn mirrored(vertex: Vertex) -> Vertex {
     Vertex::new(vertex.col, vertex.row)
 }
 
-/// Returns a grid with mirrored vertices: that of a flopped image, corrected.
+/// Returns a grid with mirrored vertices. This corrects the grid of a mirrored image.
 pub(crate) fn mirror_image(grid: &SaddleGrid) -> SaddleGrid {
     grid.iter().map(|(&vertex, &placed)| (mirrored(vertex), placed)).collect()
 }

@@ -11,8 +11,8 @@
 //! Round dots have waves along and across, but a negative F_33, because they leave the corners of the squares.
 //!
 //! Random cells and those of a dither are squares. A few of them that happen to alternate form rows of corners rather
-//! than areas. Many of them alternate except for isolated ones among the others, while a cover over a board seldom ends
-//! with a square on all four sides.
+//! than areas. Many of them alternate except for isolated ones among the others, while the outline
+//! of an occluder seldom follows a square on all four sides.
 
 use std::collections::BTreeSet;
 
@@ -24,8 +24,8 @@ use deltille_core::raster::ImageView;
 /// Number of whole squares of the smallest board, of 3 × 3 corners.
 const MIN_SQUARES: usize = 4;
 
-/// Minimum F_3, relative to F_1. The model reads a wave as a blur of a quarter of an edge. Such a blur leaves an F_3 of
-/// 0.028; a wave has none.
+/// Minimum F_3, relative to F_1. The model mistakes a wave for a blur of a quarter of an edge. Such
+/// a blur leaves an F_3 of 0.028; a wave has none.
 const WAVE: f64 = 0.02;
 
 /// Maximum F_3 of plain squares, relative to F_1; tags have more.
@@ -68,7 +68,8 @@ struct Waves {
     along: f64,
     across: f64,
     both: f64,
-    /// Standard deviation of each by noise and by the positions of the corners, from waves whose two halves differ.
+    /// Standard deviation of each due to noise and to errors of the corner positions, from waves
+    /// whose two halves differ.
     noise: f64,
 }
 

@@ -1,8 +1,8 @@
 //! Absolute labels for the corners of a grid: by tags, by an outline, or none.
 //!
 //! An image may show a board mirrored by a scanner, a projector or the camera's driver. A mirrored grid is still a
-//! right-handed lattice, but it lies on the panel with rows and columns exchanged. No direct view of the print has such
-//! labels, so they are given only on request.
+//! right-handed lattice, but it lies on the panel with rows and columns exchanged. No direct view
+//! of the print yields these labels, so they are given only on request.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -39,9 +39,9 @@ pub(crate) struct Labels {
 enum Source {
     /// No absolute labels.
     None,
-    /// By the outline of a board that is seen whole.
+    /// By the outline of an entirely visible board.
     Outline(BTreeSet<Vertex>),
-    /// By the rows and columns of a checkerboard that is seen whole.
+    /// By the rows and columns of an entirely visible checkerboard.
     Rectangle([u32; 2]),
     /// By the tags of a target, or by the outlines of its untagged panels.
     Target { tags: Option<Box<TagLabeller>>, panels: Vec<TargetPanel> },
@@ -161,7 +161,7 @@ impl Labels {
                 if !self.allow_mirrored && labelled.iter().any(|labelled| labelled.mirrored) {
                     return vec![in_mirror(found)];
                 }
-                // Corners that are joined to labelled panels without belonging to one are not reported.
+                // Corners that are joined to a labelled panel but belong to none are not reported.
                 labelled.iter().map(|l| (on_panel(found, &panels[l.panel], l), None)).collect()
             }
         }
@@ -177,8 +177,9 @@ impl Labels {
         !matches!(self.source, Source::None)
     }
 
-    /// Returns the number of corners of the largest target. A larger grid without a tag is something else: a halftone,
-    /// a fabric or a tiled floor is as regular as a board, but seldom as small.
+    /// Returns the number of corners of the largest target. A larger grid without a tag is not a
+    /// target: a halftone, a fabric or a tiled floor can be regular, too, but seldom has so few
+    /// corners.
     pub(crate) fn most_corners(&self) -> usize {
         match &self.source {
             Source::None => MAX_CORNERS,
@@ -196,7 +197,8 @@ impl Labels {
         }
     }
 
-    /// Labels a grid by the outline of an untagged board, which its mirror image may also fit.
+    /// Labels a grid by the outline of an untagged board. The mirror image of the grid may also
+    /// fit.
     fn on_outline(
         &self,
         found: FoundGrid,
@@ -219,8 +221,8 @@ impl Labels {
     }
 }
 
-/// Returns the panels of the first target in a grid; no two targets share tags. If no target fits, returns the result
-/// of a target whose tags were read.
+/// Returns the panels of the first target that is found in a grid; no two targets share tags. If no
+/// target fits, returns the result of a target whose tags were read.
 fn in_scene(
     targets: &[(String, Labels)],
     image: ImageView,
@@ -251,8 +253,9 @@ fn in_mirror(found: FoundGrid) -> (Grid, Option<Reason>) {
     (Grid { mirrored: true, ..unlabelled(found) }, Some(why))
 }
 
-/// Removes corners and tags that a larger grid of the same panel, earlier in the list, already contains. Beside a tag
-/// of few pixels, a corner may be found twice, 1 px apart. Returns a reason if copies are a whole edge apart.
+/// Removes corners and tags that a larger grid of the same panel, earlier in the list, already
+/// contains. Next to a tag that is only a few pixels wide, a corner may be found twice, 1 px apart.
+/// Returns a reason if copies are a whole edge apart.
 pub(crate) fn report_once(grids: &mut Vec<(Grid, Option<Reason>)>) -> Option<Reason> {
     let (mut corners, mut tags) = (BTreeMap::new(), BTreeSet::new());
     let mut elsewhere = 0;
@@ -296,8 +299,8 @@ fn largest(panels: &[TargetPanel]) -> usize {
     panels.iter().map(|panel| panel.corner_ids.len()).max().unwrap_or(0)
 }
 
-/// Returns whether a grid has as many corners as several untagged panels, such as faces of a solid, that cannot be
-/// distinguished.
+/// Returns whether the number of corners of a grid equals that of several untagged panels that
+/// cannot be distinguished, for example the faces of a solid.
 fn have_equal_size(panels: &[TargetPanel], grid: &SaddleGrid) -> bool {
     let is_full = |panel: &&TargetPanel| !panel.tagged && panel.corner_ids.len() == grid.len();
     panels.iter().filter(is_full).count() > 1

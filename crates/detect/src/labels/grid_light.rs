@@ -10,9 +10,9 @@
 //! with the normal n of the edge, the covariance Σ of the blur, and the curvature κ of the camera's tone curve. Edges
 //! of several directions determine Σ, so motion counts as blur.
 //!
-//! Limits: motion is modelled as a Gaussian of the same variance, and the whole grid has one blur. Where white is
-//! saturated, less of the edge is visible: from a share θ of white on, everything is as bright as white, and S is cut
-//! there.
+//! Limitations: motion is modelled as a Gaussian of the same variance, and the whole grid has one
+//! blur. Where white is saturated, less of the edge is visible: above a share θ of white,
+//! everything is as bright as white, and S is clipped.
 
 use std::collections::BTreeMap;
 
@@ -30,7 +30,8 @@ const ACROSS: usize = 13;
 /// Positions along an edge that are averaged, far from its corners.
 const ALONG: [f64; 3] = [0.38, 0.5, 0.62];
 
-/// Number of edges that determine the blur. More edges gain nothing, because the blur model itself is no more accurate.
+/// Number of edges that determine the blur. More edges gain nothing, because errors of the blur
+/// model then dominate.
 const BLUR_EDGES: usize = 150;
 
 /// Ratio of successive standard deviations of the blur that are tried. The nearest is within 6 % of the true one.
@@ -42,7 +43,7 @@ const MIN_BLUR_PX: f64 = 0.35;
 /// Number of standard deviations that are tried. The last is 6 px, half a tile.
 const BLUR_STEPS: i32 = 26;
 
-/// Stride of the coarse search, which is followed by those around the best.
+/// Stride of the coarse search. A search of all steps around the best one follows.
 const COARSE_STEPS: i32 = 4;
 
 /// Number of edges per direction that determine the clipping of white.
@@ -51,14 +52,14 @@ const CLIPPED_EDGES: usize = 20;
 /// Fraction of full scale from which a pixel may be saturated.
 const SATURATED: f64 = 0.985;
 
-/// Shares of white from which the sensor may saturate: white is overexposed up to eight times.
+/// Shares of white from which the sensor may saturate: white is overexposed up to eightfold.
 const CLIPPED_SHARES: [f64; 8] = [1.0, 0.85, 0.65, 0.5, 0.35, 0.25, 0.18, 0.12];
 
 /// Factor by which stronger clipping must reduce the sum of squares to be accepted. Sharp edges of a rendered page,
 /// where all white is full scale, fit any share.
 const CLIPPING_GAIN: f64 = 1.5;
 
-/// Minimum standard deviation of a sample, of full scale: half a step of 8 bits.
+/// Minimum standard deviation of a sample, as a fraction of full scale: half a step of 8 bits.
 const MIN_DEVIATION: f64 = 0.002;
 
 /// Variance of the levels measured at an edge, relative to that of a sample. A few samples on either side determine
@@ -211,8 +212,8 @@ impl GridLight {
         (0.5 * (self.blur_px2[0] + self.blur_px2[2])).sqrt()
     }
 
-    /// Returns the share of white in a pixel. `brightness` is on the scale of black 0 and white 1. From the clipped
-    /// share on, the result is a lower bound.
+    /// Returns the share of white in a pixel. `brightness` is on the scale of black 0 and white 1.
+    /// Above the clipped share, the result is a lower bound.
     pub(crate) fn share(&self, brightness: f64) -> f64 {
         if self.clipped_share < 1.0 {
             return brightness * self.clipped_share;
@@ -301,7 +302,8 @@ impl GridLight {
         (half > 0.0).then_some([middle - half, 2.0 * half])
     }
 
-    /// Samples across the edge along step `k` from a vertex. Returns `None` if a tile beside it leaves the image.
+    /// Samples across the edge along step `k` from a vertex. Returns `None` if a tile next to it
+    /// extends beyond the image.
     fn profile(
         &self,
         image: ImageView,
@@ -362,8 +364,8 @@ impl GridLight {
     }
 }
 
-/// Returns the visible part of S at a distance from an edge, if everything from a share of white on looks white. Scale:
-/// black is −1, and apparent white is 1.
+/// Returns the visible part of S at a distance from an edge, if everything above a share of white
+/// looks white. Scale: black is −1, and apparent white is 1.
 fn shown(distance_px: f64, sigma_px: f64, clipped_share: f64) -> f64 {
     let s = f64::from(erf_sqrt_half((distance_px / sigma_px) as f32));
     let share = (0.5 + 0.5 * s).min(clipped_share) / clipped_share;
@@ -390,7 +392,8 @@ impl Profile {
             right += row * value;
             power += value * value;
         }
-        // Sharp edges have no samples that determine the curvature, and clipping looks like it.
+        // Sharp edges have no samples that determine the curvature, and clipping resembles a
+        // curvature.
         normal[(2, 2)] += if clipped_share < 1.0 { STRONG_PRIOR } else { WEAK_PRIOR };
         let solution = normal.cholesky()?.solve(&right);
         let squares = (power - solution.dot(&right)).max(0.0);
@@ -414,7 +417,7 @@ fn best_step(
 ) -> (i32, f64) {
     let left = |step: i32| {
         let sigma_px = MIN_BLUR_PX * BLUR_STEP.powi(step);
-        // If nothing of the edge is left, it cannot be fitted.
+        // If nothing of the edge remains visible, it cannot be fitted.
         let squares = profiles
             .iter()
             .map(|p| p.fit(sigma_px, clipped_share).map_or(f64::INFINITY, |fit| fit.squares));
@@ -424,8 +427,8 @@ fn best_step(
     all.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::INFINITY))
 }
 
-/// Returns θ, the largest share for which edges of all directions fit nearly best, or as well as samples with this
-/// standard deviation allow.
+/// Returns θ, the largest share for which edges of all directions fit nearly best, or fit within
+/// the scatter of samples with this standard deviation.
 fn clipped_share(by_direction: &[Vec<Profile>], deviation: f64) -> f64 {
     let some: Vec<Vec<&Profile>> = by_direction
         .iter()
@@ -441,14 +444,15 @@ fn clipped_share(by_direction: &[Vec<Profile>], deviation: f64) -> f64 {
     tried.into_iter().find(|(left, _)| *left <= limit).map_or(1.0, |(_, share)| share)
 }
 
-/// Returns the covariance Σ whose variances nᵀΣn fit the given ones best. It is slightly rounder where the directions
-/// do not determine it.
+/// Returns the covariance Σ whose variances nᵀΣn fit the given ones best. Where the directions do
+/// not determine it, a weak prior makes it isotropic.
 fn covariance(widths: &[([f64; 3], f64)]) -> [f64; 3] {
-    /// Weight of roundness, relative to the equation of one direction.
+    /// Weight of the isotropic prior, relative to the equation of one direction.
     const ROUND: f64 = 0.01;
-    /// Minimum variance in any direction, relative to that of the sharpest edges. It keeps Σ positive definite, and
-    /// motion may blur another direction less than all edge directions. From 0.15 to 0.6, the number of tags read under
-    /// strong motion changes by 0.8 %; with 1 it is 2 % lower.
+    /// Minimum variance in any direction, relative to that of the sharpest edges. It keeps Σ
+    /// positive definite. Motion may blur another direction less than all edge directions. From
+    /// 0.15 to 0.6, the number of tags read under strong motion changes by 0.8 %; with 1 it is 2 %
+    /// lower.
     const SHARPEST: f64 = 0.3;
     let mean = widths.iter().map(|w| w.1).sum::<f64>() / widths.len().max(1) as f64;
     let mut normal = Matrix3::<f64>::identity() * ROUND;

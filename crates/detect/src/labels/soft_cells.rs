@@ -15,7 +15,7 @@
 //! The shares depend only on the blur in tile coordinates, which neighbouring tiles share. So K is computed once, and
 //! each tile costs one multiplication.
 //!
-//! Limits: cells are treated as independent, although wide blur correlates their errors.
+//! Limitations: cells are treated as independent, although wide blur correlates their errors.
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -39,7 +39,8 @@ const LOG_VARIANCE_STEP: f64 = 0.3;
 /// Step between distinct correlations of the blur: a fifth.
 const CORRELATION_STEP: f64 = 0.2;
 
-/// Standard deviation of a sample by model errors, relative to the contrast: positions, shape of the blur, dirt.
+/// Standard deviation of a sample due to model errors, relative to the contrast: positions, shape
+/// of the blur, dirt.
 const MODEL_ERROR: f64 = 0.05;
 
 /// Number of pixels over which an interpolated sample averages the noise: 1 / (2/3)².
@@ -48,8 +49,8 @@ const SAMPLE_PX2: f64 = 2.25;
 /// Factor of the noise variance of a sample. Black, white and the width of the blur are measured with the same noise.
 const NOISE_WEIGHT: f64 = 1.5;
 
-/// Largest correlation of a blur in tile coordinates: the centre of the interval rounded to 1, because no covariance
-/// has a correlation of 1.
+/// Largest correlation of a blur in tile coordinates: the centre of the interval that is rounded to
+/// 1, because no covariance has a correlation of 1.
 const MAX_CORRELATION: f64 = 0.95;
 
 /// Squared distance, in σ of the blur, beyond which a part of a cell is ignored. Its weight there is e⁻⁸ of that in the
@@ -62,8 +63,9 @@ const MIN_VARIANCE: f64 = 1e-3;
 /// Minimum standard deviation of a predicted sample, relative to the contrast: a fiftieth of [`MODEL_ERROR`].
 const MIN_SPREAD: f32 = 1e-3;
 
-/// Probability above the bound from which the truncated mean is computed. Below it, the mean is within σ/4 of the
-/// bound, and the error function is off by 1/1000 of the remaining probability.
+/// Minimum probability above the bound at which the truncated mean is computed. Below it, the mean
+/// is within σ/4 of the bound, and the error function is off by 1/1000 of the remaining
+/// probability.
 const MIN_ABOVE: f32 = 1e-4;
 
 /// Standard deviation of the grey levels, relative to the contrast.
@@ -72,10 +74,10 @@ const LEVEL_ERROR: f64 = 0.15;
 /// Standard deviation of their slopes over a tile.
 const SLOPE_ERROR: f64 = 0.2;
 
-/// Largest half log-odds of a cell: one in two hundred is dirty on the print.
+/// Largest half log-odds of a cell: one in two hundred cells is dirty on the print.
 const MAX_HALF_ODDS: f64 = 2.6;
 
-/// Number of unknowns beside the cells: the level and its slopes along u and v.
+/// Number of unknowns in addition to the cells: the level and its slopes along u and v.
 const LEVELS: usize = 3;
 
 /// Number of iterations that replace saturated or missing samples by their expectation from the others.
@@ -107,7 +109,7 @@ pub(crate) struct TileBlur {
     pub noise: f64,
 }
 
-/// The estimator K and its related terms.
+/// The estimator K and related terms.
 #[derive(Debug)]
 pub(crate) struct Mixing {
     bits: usize,
@@ -119,7 +121,7 @@ pub(crate) struct Mixing {
     half_shares: Vec<Vec<f32>>,
     /// 1/v, by bit.
     inverse_variance: Vec<f32>,
-    /// Standard deviation of the predicted sample if nothing is known of the cells, by sample.
+    /// Standard deviation of each predicted sample if nothing is known about the cells.
     spread: Vec<f32>,
 }
 
@@ -230,7 +232,7 @@ impl CellModel {
         }
         let white: Vec<f64> =
             self.points.iter().map(|&p| self.white_beyond(p, [uu, uv, vv])).collect();
-        // Samples denser than pixels share their noise.
+        // The noise of samples that are denser than pixels is correlated.
         let samples_px2 = n as f64 / (bits as f64 * self.cell_area() * area_px2);
         let variance = NOISE_WEIGHT * noise * noise * (SAMPLE_PX2 * samples_px2).max(1.0)
             + MODEL_ERROR * MODEL_ERROR * samples_px2.max(1.0);
@@ -452,8 +454,9 @@ mod tests {
         TileBlur { covariance, area_px2: 16.0, noise: 0.05 }
     }
 
-    /// The model reads tags that are rendered and blurred independently of it. Under weak blur all cells are right.
-    /// Under strong blur no more are wrong than the odds predict.
+    /// The model reads tags that are rendered and blurred independently of it. Under weak blur, all
+    /// cells are correct. Under strong blur, the number of wrong cells does not exceed the
+    /// prediction of the odds.
     #[test]
     fn cell_errors_match_the_odds() {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
@@ -480,7 +483,8 @@ mod tests {
         }
     }
 
-    /// Erased samples contain no information, and a lower bound no more than its value.
+    /// Erased samples contain no information, and a lower bound contains no more information than
+    /// the value itself.
     #[test]
     fn unseen_cells_stay_unknown() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);

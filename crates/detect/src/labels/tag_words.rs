@@ -2,7 +2,8 @@
 
 use deltille_core::family::Family;
 
-/// Weight of the cell frequencies of the family against those of the target, in codes.
+/// Weight of the cell frequencies of the family relative to those of the target, as a number of
+/// codes.
 const FAMILY_WEIGHT: f64 = 16.0;
 
 /// Minimum distance of a frequency from 0 and 1.
@@ -80,7 +81,8 @@ impl TargetWords {
         self.words[index]
     }
 
-    /// Returns Λ of every word, nats: the log-likelihood ratio of the word to words drawn by the cell frequencies.
+    /// Returns Λ of every word, nats: the log-likelihood ratio of the word to words drawn from the
+    /// cell frequencies.
     pub(crate) fn evidence(&self, half_odds: &[f32]) -> Vec<f32> {
         let bytes = half_odds.len().div_ceil(8);
         // Sum of the half odds of the white cells, for each value of each byte of 8 cells.
@@ -128,8 +130,9 @@ mod tests {
 
     use super::*;
 
-    /// For any tile, the mean of e^Λ over words drawn by the cell frequencies is 1. By Markov's inequality, e^Λ of
-    /// noise exceeds n less often than once in n. Computed together or one by one, Λ is the same.
+    /// For any tile, the mean of e^Λ over words drawn from the cell frequencies is 1. By Markov's
+    /// inequality, e^Λ of noise exceeds n less often than once in n. Computed together or one by
+    /// one, Λ is the same.
     #[test]
     fn the_mean_evidence_of_drawn_words_is_one() {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(2);

@@ -16,12 +16,12 @@ use deltille_core::targets::{Panel, TagsIn};
 /// Minimum contrast at the edges of a tile, relative to that at its corners.
 const MIN_CONTRAST: f64 = 0.4;
 
-/// Contrasts above the surrounding white from which a sample counts as glare, in addition to [`GLARE_NOISE`] standard
-/// deviations. Paper is never so bright.
+/// Brightness above the surrounding white from which a sample counts as glare, relative to the
+/// contrast. [`GLARE_NOISE`] standard deviations are added to it. Paper is never this bright.
 const GLARE: f64 = 0.35;
 
-/// Standard deviations of the noise added to [`GLARE`]. Without them, noise would erase white cells only. It seldom
-/// exceeds 3σ.
+/// Standard deviations of the noise added to [`GLARE`]. Without them, noise would erase white cells
+/// only. Noise seldom exceeds 3σ.
 const GLARE_NOISE: f64 = 3.0;
 
 /// Fraction of full scale from which a pixel may be saturated.
@@ -30,15 +30,16 @@ const SATURATED: f64 = 0.985;
 /// Depth from the edge at which untagged tiles, bright and dark, are sampled, in tile coordinates.
 const PLAIN_DEPTH: f64 = 0.2;
 
-/// Minimum depth, where a tag leaves no more.
+/// Minimum depth if a tag leaves less room.
 const MIN_DEPTH: f64 = 0.06;
 
 /// Half the interval over which the map of a tile is differentiated, in tile coordinates. It stays inside the tile,
 /// because the centre of a triangle is at a third.
 const BESIDE: f64 = 0.25;
 
-/// Range of shares of white that are used as measured; values outside are not noise. A range of 0.25 to 4 beyond black
-/// and white reads the same tags. With 0 it reads 1.5 % fewer, because noise exceeds it.
+/// Range in which shares of white are used as measured; values outside are not noise. Any margin of
+/// 0.25 to 4 beyond black and white gives the same tags. Without a margin, 1.5 % fewer tags are
+/// read, because noise exceeds the range.
 const SHARES: [f64; 2] = [-0.5, 1.5];
 
 /// The cells of a tile.
@@ -56,7 +57,8 @@ impl Reading {
         self.half_odds.iter().rev().fold(0, |word, odds| word << 1 | u64::from(*odds > 0.0))
     }
 
-    /// Returns the information in the cells, bits: one for each certain cell, none for each cell that may be either.
+    /// Returns the information in the cells, bits: one for each certain cell, none for each
+    /// undetermined cell.
     pub(crate) fn information_bits(&self) -> f64 {
         let known = |&half_odds: &f32| {
             let wrong = 1.0 / (1.0 + (2.0 * f64::from(half_odds.abs())).exp());
@@ -93,7 +95,7 @@ impl TagPlace {
     }
 }
 
-/// Black and white beside edges of tiles that were read, by vertex and direction.
+/// Black and white levels next to the edges of tiles that were read, by vertex and direction.
 type EdgeLevels = BTreeMap<(Vertex, usize), Option<[f64; 2]>>;
 
 /// Results of reading a tile that the next tiles of its grid reuse.
@@ -113,7 +115,7 @@ pub(crate) struct TagReader {
     clear: ClearDepth,
     /// For each bit, the bit whose cell takes its position in a mirror image.
     mirror: Vec<u8>,
-    /// Bits of cells that no code uses, and that may have a hole.
+    /// Bits of cells that no code uses, and that may contain a hole.
     free: u64,
 }
 
@@ -152,8 +154,8 @@ impl TagReader {
         }
     }
 
-    /// Reads tiles of a grid whose corners are known. Only tiles that may carry a tag are read, of a board that is
-    /// inverted or not. At most `most` tiles are read, spread over the grid.
+    /// Reads tiles of a grid whose corners are known. Reads only tiles that may carry a tag, on an
+    /// inverted or a normal board. At most `most` tiles are read, spread over the grid.
     pub(crate) fn read(
         &self,
         image: ImageView,

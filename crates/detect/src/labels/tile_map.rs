@@ -61,8 +61,9 @@ impl TileMap {
     }
 }
 
-/// Returns the width of the tiles next to a tile, in widths of that tile, if every second tile is a gap. The distance
-/// of the corners beyond the tile shows whether it is a tag or a small square.
+/// Returns the width of the tiles next to a tile, in widths of that tile, if every second tile is a
+/// gap. The distance of the corners beyond the tile shows whether the tile is a tag or a small
+/// square.
 fn next_tiles(known: &[(Vertex, DVec2)], tile: Tile, gap: f64) -> f64 {
     let own: Vec<Vertex> = tile.vertices().collect();
     let (mut inside, mut outside) = ((0.0, 0.0), (0.0, 0.0));
@@ -103,8 +104,8 @@ mod tests {
     use crate::grid::saddle_grid::PlacedSaddle;
     use deltille_core::lattice::GridKind;
 
-    /// Tiles of an AprilGrid, seen straight on: the centre of each is mapped to its centre, also at the border of the
-    /// grid.
+    /// Tiles of an AprilGrid, seen frontally: the map of each tile returns its true centre,
+    /// including tiles at the border of the grid.
     #[test]
     fn gaps_between_tags_do_not_bend_the_map() {
         let gap = 0.3;

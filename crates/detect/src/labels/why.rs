@@ -9,8 +9,8 @@ use deltille_core::lattice::GridKind;
 use deltille_core::raster::{Gray, PYRAMID_FULL_SCALE, Pyramid};
 use deltille_core::statistics::median;
 
-/// Brightest pixels, of full scale, below which an image is too dark. It cannot show a board in more than a dozen grey
-/// levels.
+/// Brightness of the brightest pixels, as a fraction of full scale, below which an image is too
+/// dark. An image this dark shows a board in at most a dozen grey levels.
 const DARK: f64 = 0.06;
 
 /// Fraction of saturated pixels above which an image is overexposed.
@@ -22,7 +22,7 @@ const SATURATED: f64 = 0.985;
 /// Blur that hides corners on all levels of the pyramid, px.
 const HIDING_BLUR_PX: f64 = 6.0;
 
-/// Minimum length of a readable cell on a board of tags, px, for any sharpness.
+/// Minimum length of a readable cell on a board of tags, px, however sharp the image is.
 const MIN_BIT_PX: f64 = 1.25;
 
 /// Minimum length of a readable cell, in standard deviations of the blur.
@@ -31,13 +31,14 @@ const MIN_BIT_BLURS: f64 = 1.0;
 /// Factor by which cells must be longer to read a single tag than to read a board.
 const TAG_FOR_TAG: f64 = 2.0;
 
-/// One pixel in so many may be outside the range of the image: dead, hot, or a spark. The smoothing of level 0 spreads
-/// each over nine pixels, so a dark image with one hot pixel in 9000 is still dark. From 250 to 4000 the reported blur
-/// changes by 4 %. At 100, a small board in the light counts as sparks.
+/// One in this many pixels may be outside the range of the image: dead, hot, or a specular
+/// highlight. The smoothing of level 0 spreads each over nine pixels, so a dark image with one hot
+/// pixel in 9000 is still dark. From 250 to 4000 the reported blur changes by 4 %. At 100, a small
+/// bright board would be ignored as highlights.
 const PIXELS_A_DEAD_ONE: usize = 1000;
 
-/// One pixel in so many may be steeper than the sharpest edges. In two megapixels, the edges of a single tile of a
-/// board, 100 px long, have as many pixels.
+/// One in this many pixels may have a steeper gradient than the sharpest edges. In two megapixels,
+/// the edges of a single tile of a board, 100 px long, have as many pixels.
 const PIXELS_A_STEEP_ONE: usize = 5000;
 
 /// Returns the reason why nothing was found in an image with this number of corners of its tiling.

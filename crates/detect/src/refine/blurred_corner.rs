@@ -8,8 +8,9 @@
 //!     checker     s₁ s₂                        f = E[sign(h₁ + z₁) sign(h₂ + z₂)],  corr(z) = ρ
 //! ```
 //!
-//! where s = sign h, and ρ = cos(θ₂ − θ₁) is the cosine between the normals of the edges. With Drezner and Wesolowsky's
-//! integral for the orthant probability (1990, J. Stat. Comput. Simul. 35)
+//! where s = sign h, and ρ = cos(θ₂ − θ₁) is the cosine of the angle between the normals of the
+//! edges. With Drezner and Wesolowsky's integral for the orthant probability (1990, J. Stat.
+//! Comput. Simul. 35)
 //!
 //! ```text
 //!     f = erf(h₁/√2) erf(h₂/√2) + 2/π ∫₀^{asin ρ} exp(−(h₁² + h₂² − 2 h₁h₂ sin φ)/(2 cos² φ)) dφ
@@ -53,9 +54,9 @@ pub(crate) struct Shade<const K: usize> {
     pub correlation: f32,
     /// ∂f/∂α, with the strength α of a halo; 0 without one.
     pub halo: f32,
-    /// Derivatives by the parameters of a triangle between the edges; 0 without one.
+    /// Derivatives with respect to the parameters of a triangle between the edges; 0 without one.
     pub triangle: [f32; TRIANGLE_PARAMS],
-    /// Derivatives by half of the motion across each edge; 0 without motion.
+    /// Derivatives with respect to half of the motion across each edge; 0 without motion.
     pub way: [f32; K],
 }
 
@@ -169,7 +170,7 @@ impl Overlap {
     }
 }
 
-/// Number of parameters that a triangle depends on, beside the distances from the edges.
+/// Number of parameters that a triangle depends on, besides the distances from the edges.
 pub(crate) const TRIANGLE_PARAMS: usize = 5;
 
 /// An [`Overlap`] with its derivatives, for many pixels.
@@ -224,7 +225,7 @@ impl<const K: usize, P: Pattern<K>> Pattern<K> for Inked<P> {
 const MIN_WAY: f32 = 0.1;
 
 /// Three edges in an image that moved along a line at constant speed, half of the motion on each side of the centre.
-/// The blur of an edge is then a box after a Gaussian.
+/// The blur of an edge is then a Gaussian convolved with a box.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SweptDeltille {
     /// Half of the motion across each edge, in units of the blur: its length, the inverse of its double, and its sign.
@@ -241,7 +242,8 @@ impl SweptDeltille {
         Self { reach, over_whole, signs: way.map(f32::signum) }
     }
 
-    /// Returns an edge at this distance, its slope, and its derivative by the motion.
+    /// Returns the brightness at this distance from an edge, its slope, and its derivative with
+    /// respect to the motion.
     #[inline(always)]
     fn edge(&self, k: usize, h: f32) -> [f32; 3] {
         let [ahead, behind] = [h + self.reach[k], h - self.reach[k]];
@@ -271,7 +273,8 @@ impl Pattern<3> for SweptDeltille {
     }
 }
 
-/// Two edges in motion. The box consists of four Gaussians, and the rest is blur.
+/// Two edges in motion. The box is approximated by four Gaussians, and the rest of its variance is
+/// added to the blur.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SweptChecker<P> {
     /// The pattern without motion.
@@ -280,7 +283,7 @@ pub(crate) struct SweptChecker<P> {
     pub way: [f32; 2],
 }
 
-/// Fraction of the variance of a box that the positions of its four equal parts have.
+/// Fraction of the variance of a box that comes from the positions of its four equal parts.
 pub(crate) const PLACES_OF_FOUR: f64 = 15.0 / 16.0;
 
 impl<P: Pattern<2>> Pattern<2> for SweptChecker<P> {

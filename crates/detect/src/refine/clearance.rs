@@ -35,8 +35,8 @@ type TilesOfPanels = BTreeMap<u32, BTreeSet<Tile>>;
 /// The tiles of a target with tags, and the area of the tag in its tile.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TagAreas {
-    /// Distance from the edges of a tile to the visible tag, in edges along the other edges; the smallest of all
-    /// panels.
+    /// Distance from the edges of a tile to the visible tag, measured along the adjacent edges, in
+    /// edge lengths. It is the minimum over all panels.
     inset: f64,
     /// Tiles with a tag, by panel id, for each target; with its name if there are several.
     targets: Vec<(Option<String>, TilesOfPanels)>,
@@ -95,7 +95,7 @@ pub(crate) const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 /// Signed distance from a line, px: a·u + b·v + c.
 type Line = [f64; 3];
 
-/// The surroundings of a corner, in px from it.
+/// The surroundings of a corner, in px relative to it.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Surroundings {
     /// Far sides of the tiles, positive towards the corner.
@@ -113,7 +113,7 @@ pub(crate) struct Surroundings {
 pub(crate) struct Edge {
     /// Direction within 180°, radians.
     pub angle_rad: f64,
-    /// Curvature to the left of that direction (towards greater v of u), 1/px.
+    /// Curvature to the left of that direction (towards greater v for the direction u), 1/px.
     pub bend: f64,
     /// Distance in the image, perpendicular to the edge, of a point one edge length away on the print, px.
     pub across_px: f64,
@@ -172,7 +172,8 @@ impl Surroundings {
 }
 
 /// Returns the surroundings of every corner of a grid, in order, in pixels of `scale` times the size of the grid's
-/// pixels. If the neighbours of a corner are collinear, nothing is known of it, and no area counts as clear.
+/// pixels. If the neighbours of a corner are collinear, nothing is known about its surroundings,
+/// and no area counts as clear.
 pub(crate) fn surroundings(grid: &Grid, tags: &TagAreas, scale: f64) -> Vec<Surroundings> {
     surroundings_of(grid, tags, scale, 0..grid.corners.len())
 }
@@ -222,8 +223,9 @@ pub(crate) fn surroundings_of(
     corners.map(|i| around(&grid.corners[i]).unwrap_or_default()).collect()
 }
 
-/// Returns the crossing of the lines through the neighbours of a corner, px, if the corner is displaced from them.
-/// Returns `None` if it lies as near to them as lens distortion permits, or if there are fewer than two lines.
+/// Returns the intersection of the lines through the neighbours of a corner, px, if the corner is
+/// displaced from them. Returns `None` if lens distortion explains the displacement, or if there
+/// are fewer than two lines.
 pub(crate) fn crossing(grid: &Grid, corner: &GridCorner) -> Option<DVec2> {
     let places = Places::of(grid, 1.0);
     let vertex = Vertex::new(corner.row, corner.col);
@@ -359,7 +361,7 @@ fn edges(
 /// Returns the sum of the distances of all neighbours from the line along one of them, in edges.
 fn rows_apart(kind: GridKind) -> f64 {
     match kind {
-        // Four of six lie beside the line, by the height of a triangle.
+        // Four of six lie off the line, by the height of a triangle.
         GridKind::Deltille => 4.0 * 3f64.sqrt() / 2.0,
         GridKind::Checker => 2.0,
     }

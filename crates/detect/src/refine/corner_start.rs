@@ -1,9 +1,10 @@
 //! Edges, contrast and blur around a position: the start values of the model fit.
 //!
-//! In a grid, the edges lead to the neighbours. For a single corner, circles give them. A corner of three edges is odd
-//! under a rotation by 180°, and one of two edges is even. So opposite samples are combined, and half a circle remains.
-//! All ways to divide it into K + 1 runs of equal sign are tried, and the one that separates dark from bright best is
-//! used. Unlike the roots of a fitted polynomial it always exists, and noise cannot hide an edge.
+//! In a grid, the edges point to the neighbours. For a single corner, they are measured on circles.
+//! A corner of three edges is odd under a rotation by 180°, and one of two edges is even. So
+//! opposite samples are combined, and half a circle remains. All ways to divide it into K + 1 runs
+//! of equal sign are tried, and the one that separates dark from bright best is used. Unlike the
+//! roots of a fitted polynomial it always exists, and noise cannot hide an edge.
 
 use std::f64::consts::PI;
 
@@ -16,14 +17,15 @@ use crate::lanes;
 use crate::lanes::LANES;
 use deltille_core::raster::ImageView;
 
-/// Directions on the half-circle: 7.5° apart, so that the 17° between edges at 75° contain two.
+/// Directions on the half-circle: 7.5° apart, so that the 17° between edges at 75° of tilt contain
+/// two.
 const DIRECTIONS: usize = 24;
 
 /// Shortest run between edges: two directions.
 const MIN_RUN: usize = 2;
 
-/// Minimum angle between edges at the start. Blur lets narrow sectors fade, and edges that have merged cannot be
-/// separated again.
+/// Minimum angle between edges at the start. Blur makes narrow sectors fade, and edges that have
+/// merged cannot be separated again.
 const MIN_START_RAD: f64 = 15.0 * PI / 180.0;
 
 /// Radii of the circles, as fractions of the radius of the window.
@@ -41,8 +43,9 @@ const MIN_START_BLUR_PX: f64 = 0.6;
 /// centre.
 const MAX_START_BLUR: f64 = 0.5;
 
-/// Returns the start for a corner from the pixels of a window. The edges have these directions, increasing within 180°,
-/// under a blur of `blur_px`. Returns `None` if the window shows only one side of the edges.
+/// Returns the start values of a corner from the pixels of a window. The edges have these
+/// directions, increasing within 180°, under a blur of `blur_px`. Returns `None` if the window
+/// shows only one side of the edges.
 pub(crate) fn start_along<const K: usize>(
     window: &Window,
     pixels: &[f32],
@@ -223,8 +226,9 @@ fn best_runs<const K: usize>(profile: &[f64; DIRECTIONS], odd: bool) -> Option<R
         for b in a + MIN_RUN..DIRECTIONS {
             let (count, sum) = ((b - a) as f64, sums[b] - sums[a]);
             if odd {
-                // Beyond the third edge the profile is as between the first two; before the first it is negated. It is
-                // + on a..b and c.., − on ..a and b..c.
+                // Beyond the third edge, the profile has the same sign as between the first two;
+                // before the first, it has the opposite sign. It is + on a..b and c.., − on ..a and
+                // b..c.
                 for c in b + MIN_RUN..DIRECTIONS.min(DIRECTIONS + a - MIN_RUN + 1) {
                     let alternating = sum - sums[a] - (sums[c] - sums[b]) + whole - sums[c];
                     let mut edges = [0; K];

@@ -9,11 +9,12 @@
 //!     factor = Σ c² r²/(1 − H) / (σ² Σ c²) · (1 + Σ_lags ρ(lag) Σ c(p) c(p + lag) / Σ c²)
 //! ```
 //!
-//! pooled over corners of an image. The even part about a corner (equal at opposite pixels) and the odd part have
-//! separate factors. Consider a blur that differs from that of the model, for example after motion. The residuals of a
-//! corner of three edges are then odd. They do not move it, because its influence is nearly even. For two edges it is
-//! the other way round. A fit removes from its residuals the components that resemble its parameters: E[r rᵀ] = σ² (1 −
-//! H) with the hat matrix H of white noise, so the division by 1 − H restores them.
+//! pooled over the corners of an image. The even part about a corner (equal at opposite pixels) and
+//! the odd part have separate factors. Consider a blur that differs from that of the model, for
+//! example after motion. The residuals of a corner of three edges are then odd. They do not move
+//! it, because its influence is nearly even. For two edges, the reverse is true. A fit removes from
+//! its residuals the components that resemble its parameters: E[r rᵀ] = σ² (1 − H) with the hat
+//! matrix H of white noise, so the division by 1 − H restores them.
 
 use multiversion::multiversion;
 
@@ -48,14 +49,15 @@ const WIDE: f64 = 0.05;
 const FACTORS: [f64; 2] = [0.02, 40.0];
 
 /// Minimum fraction of a pixel's noise that a fit leaves in its residual. If a fit follows a pixel more closely, its
-/// residual contains no information on its noise. Nearly all pixels leave more: from 0.01 to 0.2 no covariance changes.
+/// residual contains no information about its noise. Nearly all pixels leave more: from 0.01 to 0.2
+/// no covariance changes.
 const MIN_LEFT: f32 = 0.1;
 
-/// Number of corners that determine correlations; the sums of ten vary by some per cent.
+/// Number of corners that determine correlations; the sums of ten vary by a few per cent.
 pub(crate) const CORNERS: usize = 10;
 
-/// One column in so many determines the part that fits remove from residuals. That part depends only on the windows and
-/// is nearly the same for all.
+/// One in this many columns determines the part that fits remove from residuals. That part depends
+/// only on the windows and is nearly the same for all.
 const HAT_EVERY: usize = 4;
 
 impl Influence {

@@ -19,9 +19,9 @@ use deltille_core::statistics::median;
 /// Minimum strength of a halo: blur with wide tails. Below it, the tails are equivalent to a wider blur.
 const MIN_HALO: f64 = -0.45;
 
-/// Prior standard deviations of the parameters. Gamma 2.6 has (1.6, 0, 0), and smooth steps have −0.5 at both ends.
-/// Halos of 0.5 are strong. A blur twice as wide in one direction has an astigmatism of 0.6. Ink that spreads by 2 % of
-/// an edge covers a fifth of the bits of a tag.
+/// Prior standard deviations of the parameters. Gamma 2.6 has (1.6, 0, 0), and S-shaped curves have
+/// −0.5 at both ends. Halos of 0.5 are strong. A blur twice as wide in one direction has an
+/// astigmatism of 0.6. Ink that spreads by 2 % of an edge covers a fifth of the bits of a tag.
 const PRIOR: [f64; PARAMS] = [2.0, 1.0, 1.0, 0.3, 0.3, 0.5, 2.0];
 
 /// Maximum step of the parameters.
@@ -34,9 +34,9 @@ const MAX_ITERATIONS: usize = 10;
 /// parameters are nearly linear.
 const FIRST_DAMPING: f64 = 0.01;
 
-/// Remaining distance at which the iteration has converged, in standard deviations of the parameters. It is the sum of
-/// a series of further steps that shrink like the last one. A first step may be twice as long, because no step is half
-/// as long as the previous one.
+/// Remaining distance at which the iteration has converged, in standard deviations of the
+/// parameters. It is the sum of a series of further steps that shrink like the last one. A first
+/// step may be twice as long, because each step is less than half as long as the previous one.
 const CONVERGED: f64 = 0.25;
 
 /// The same where the fit only decides which groups are significant.
@@ -101,7 +101,8 @@ pub(super) struct Linearised<const K: usize> {
     pub(super) equations: Vec<Option<Joint>>,
 }
 
-/// Optics that fit the corners, the covariance of the active parameters, and the equations before the last step.
+/// Optics that fit the corners best, the covariance of the active parameters, and the equations
+/// before the last step.
 pub(super) struct Adjusted<const K: usize> {
     pub(super) optics: Optics,
     pub(super) cov: DMatrix<f64>,
@@ -123,7 +124,7 @@ pub(super) struct Reduced {
 
 impl Reduced {
     /// Returns the covariance of corner positions, xx, xy, yy, px², caused by this covariance of the common parameters:
-    /// the mean over corners with weight.
+    /// the mean over corners with nonzero weight.
     fn shift(&self, cov: &DMatrix<f64>, weights: &[f64]) -> [f64; 3] {
         let counting = self.own.iter().zip(weights).filter(|(_, weight)| **weight > 0.0);
         let mut sum = DMatrix::zeros(2, 2);
@@ -239,8 +240,8 @@ impl<const K: usize> Problem<'_, K> {
         let supported = self.estimate(&found.optics, vector, &found.cov).supported(1.0);
         let is_less = supported.active.len() < self.active.len();
         if is_less {
-            // Start at the best fit of the other groups by the noise alone. The scatter decides significance, but does
-            // not give this optimum.
+            // Starts at the best fit of the other groups with the covariance of the noise alone.
+            // The scatter determines significance, but not this optimum.
             let (step, _) = self.first_step(&found.at.optics, &found.reduced);
             let rest = step.only(&supported.active);
             found.optics = self.stepped(&found.at, &found.reduced, &rest.vector);
@@ -269,7 +270,8 @@ impl<const K: usize> Problem<'_, K> {
         None
     }
 
-    /// Returns the optics with these values of the active parameters. Moves the corners along by their equations.
+    /// Returns the optics with these values of the active parameters. Moves the corners
+    /// accordingly, by their equations.
     pub(super) fn stepped(
         &mut self,
         at: &Linearised<K>,
@@ -330,7 +332,8 @@ impl<const K: usize> Problem<'_, K> {
             // Too few to determine correlations.
             return 1.0;
         }
-        // Those of the least noise: other objects beside a corner affect its own residuals.
+        // Uses the corners with the lowest noise, because other objects next to a corner affect its
+        // residuals.
         let mut found: Vec<Influence> = members
             .iter()
             .filter_map(|member| fitter.influence(*image, &member.patch, &member.corner, optics))
@@ -431,7 +434,7 @@ fn cost<const K: usize>(at: &Linearised<K>, weights: &[f64]) -> f64 {
     prior + costs.map(of).sum::<f64>()
 }
 
-/// Returns the larger of the covariances by the noise and by the scatter of the gradients.
+/// Returns the larger of the covariances from the noise and from the scatter of the gradients.
 fn covariance(reduced: &Reduced) -> Option<DMatrix<f64>> {
     let inverse = reduced.matrix.clone().cholesky()?.inverse();
     let members = reduced.own.iter().flatten().count();

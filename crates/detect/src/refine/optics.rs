@@ -12,11 +12,12 @@ pub(super) const HALO: usize = PARAMS - 2;
 /// Index of the ink.
 pub(super) const INK: usize = PARAMS - 1;
 
-/// Step of difference quotients by a parameter of the tone curve. Its terms have seven digits, of which some four
-/// remain in the difference.
+/// Step of the difference quotients with respect to a parameter of the tone curve. The terms have
+/// seven digits. About four of these remain in the difference.
 pub(super) const STEP: f64 = 0.01;
 
-/// Width of a halo relative to the blur: masks of 1 to 2 px on images with 0.7 to 1 px of blur.
+/// Width of a halo relative to the blur: sharpening masks of 1 to 2 px on images with 0.7 to 1 px
+/// of blur.
 const HALO_WIDTH: f64 = 2.5;
 
 /// Minimum blur of the pattern without its halo, relative to a blur whose edges have the same slope.
@@ -50,7 +51,8 @@ pub(crate) struct Optics {
     pub ink: f64,
     /// Factor of the covariances of corners, for noise that is not white.
     pub inflation: f64,
-    /// Covariance xx, xy, yy of the displacement of corners by the uncertainty of the optics, px².
+    /// Covariance xx, xy, yy of the displacement of corners due to the uncertainty of the optics,
+    /// px².
     pub shift: [f64; 3],
     /// Median residual of single corners without these parameters, in units of half the contrast.
     pub plain_residual: f64,
@@ -93,7 +95,8 @@ pub(crate) struct Spread {
     length: f64,
     /// Whether there is motion blur.
     pub is_swept: bool,
-    /// Half of the motion vector, in units of the blur, and its derivatives by both parameters of astigmatism.
+    /// Half of the motion vector, in units of the blur, and its derivatives with respect to both
+    /// parameters of astigmatism.
     pub way: [f64; 2],
     pub way_by_astigmatism: [[f64; 2]; 2],
 }
@@ -107,7 +110,7 @@ impl Spread {
             + (1.0 - self.part) * (e1 * along + e2 * across)
     }
 
-    /// Returns the derivatives of [`Self::product`] by both parameters of astigmatism.
+    /// Returns the derivatives of [`Self::product`] with respect to both parameters of astigmatism.
     pub(crate) fn by_astigmatism(&self, a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
         let parts = parts(a, b);
         let round = self.part * (a[0] * b[0] + a[1] * b[1]);
@@ -134,7 +137,8 @@ impl Optics {
         Self { is_ink_open: ink.is_none(), ink: ink.unwrap_or(0.0) / INK_UNIT, ..self }
     }
 
-    /// Returns these optics with the ink spread treated as known; an unknown one counts as none.
+    /// Returns these optics with the ink spread treated as known; an unknown ink spread counts as
+    /// zero.
     pub(crate) fn with_ink_as_known(self) -> Self {
         Self { is_ink_open: false, ..self }
     }
@@ -186,7 +190,8 @@ impl Optics {
         (1.0 + strength * (1.0 - 1.0 / width)).max(MIN_CORE)
     }
 
-    /// Returns the derivative of the logarithm of [`Self::core`] by the strength of the halo.
+    /// Returns the derivative of the logarithm of [`Self::core`] with respect to the strength of
+    /// the halo.
     pub(crate) fn ln_core_by_halo(&self) -> f64 {
         (1.0 - 1.0 / self.halo[1]) / self.core()
     }
@@ -241,7 +246,7 @@ impl Optics {
         [0, 1].map(|i| f64::from(piece.terms[i]))
     }
 
-    /// Returns the derivative of κ₀ by a parameter.
+    /// Returns the derivative of κ₀ with respect to a parameter.
     pub(super) fn kappa_slope(&self, greys: [f64; 2], parameter: usize) -> f64 {
         match parameter {
             0..TONE_PARAMS => {

@@ -2,9 +2,10 @@
 //!
 //! The blur determines how far neighbouring edges reach into a window. It is estimated from a few corners, on coarser
 //! levels of the pyramid if the finest shows too little of it. The curvature of edges by lens distortion follows from
-//! the corners, which are then fitted again. A cover may still lie beside a corner. The residual of the model is then
-//! larger than elsewhere in the grid, and smaller windows are tried. A corner at the end of the visible part of the
-//! board is dropped if no window shows it cleanly, because the cover biases its position.
+//! the corners, which are then fitted again. An occluder may still lie next to a corner. The
+//! residual of the model is then larger than elsewhere in the grid, and smaller windows are tried.
+//! A corner at the end of the visible part of the board is dropped if no window shows it cleanly,
+//! because the occluder biases its position.
 
 use std::collections::BTreeMap;
 
@@ -28,26 +29,27 @@ use deltille_core::statistics::median;
 /// Number of corners from which the blur is estimated, those with the most room.
 const BLUR_CORNERS: usize = 15;
 
-/// Factor of the corners from which they are selected, all over the grid. Among four, some are clear of tags and of the
-/// border.
+/// Number of candidate corners, spread over the grid, for each of these corners. Of four
+/// candidates, some are clear of tags and of the border.
 const OVERSAMPLING: usize = 4;
 
 /// Blur that is assumed before it is estimated, px: that of a good photograph.
 const TYPICAL_BLUR_PX: f64 = 1.0;
 
 /// Largest blur as a fraction of the radius of the largest window. A larger one is estimated again on a coarser level,
-/// because the window shows little but the centre of the edges.
+/// because the window shows hardly more than the centre of the edges.
 const MAX_BLUR: f64 = 0.5;
 
 /// Maximum residual, relative to the median of the grid. A larger one shows an object other than the corner; the noise
 /// of a 7×7 window varies by a tenth.
 const MAX_RESIDUAL_RATIO: f64 = 3.0;
 
-/// Residual below which a corner is not questioned, as a fraction of the amplitude. In a clean image the median is
-/// close to zero.
+/// Residual below which a corner is always accepted, as a fraction of the amplitude. In a clean
+/// image the median is close to zero.
 const MIN_RESIDUAL: f64 = 0.05;
 
-/// Residual, relative to the median, above which there is more than noise; the scatter of noise in a window is a tenth.
+/// Residual, relative to the median, above which residuals contain more than noise. The noise of a
+/// single window scatters by a tenth.
 const UNUSUAL: f64 = 1.3;
 
 /// Maximum correlation of neighbouring residuals that is distinguished. Above it, they form one shape over the window.
@@ -59,15 +61,15 @@ const SHARP_PX: f64 = 1.4;
 /// Minimum number of corners for a task on a separate thread.
 const PART: usize = 128;
 
-/// Maximum ratio of the blur of a corner to that of its neighbours. A larger one is the edge of a cover; near the edge
-/// of fisheye images, blur doubles from one corner to the next.
+/// Maximum ratio of the blur of a corner to that of its neighbours. A larger one indicates the edge
+/// of an occluder; near the edge of fisheye images, blur doubles from one corner to the next.
 const MAX_BLUR_RATIO: f64 = 3.0;
 
-/// Maximum standard deviation of a position, px, including the shape of the residuals. Positions above it are dropped:
-/// the grid predicts as well.
+/// Maximum standard deviation of a position, px, including systematic residuals. Positions above it
+/// are dropped, because the grid predicts them equally well.
 const WORST_SIGMA_PX: f64 = 3.0;
 
-/// Ratio of successive windows.
+/// Size ratio of successive windows.
 const NEXT_WINDOW: f64 = 0.7;
 
 /// A pyramid level of an image, or the image itself in place of the finest one.
@@ -179,7 +181,8 @@ impl Refiner {
             let (refined, fit) = if clean || !judged || !modelled() {
                 (Some(refined), fit.filter(|_| clean))
             } else {
-                // If the model finds nothing, as at the edge of a cover, the position is unknown.
+                // If the model finds nothing, for example at the edge of an occluder, the position
+                // is unknown.
                 let smaller = self.clean_fit(fitter, image, corner, room, limit);
                 let found = smaller.or(fit.filter(|_| around[i].is_inner));
                 (found.map(Refined::from), found)
@@ -239,7 +242,7 @@ impl Refiner {
         self.window(image, corner.position(), room).count() >= MIN_PIXELS
     }
 
-    /// Refines all corners of a grid, each on its own.
+    /// Refines all corners of a grid separately.
     fn refine_each(
         &self,
         image: ImageView,
@@ -253,9 +256,10 @@ impl Refiner {
         })
     }
 
-    /// Moves corners at which the model fails, although it fits most others, to the crossing of the lines of their
-    /// neighbours. The crossing must be outside the range of the model: a cell of a tag was mistaken for the corner.
-    /// Returns which corners were moved.
+    /// Moves corners at which the model fails, although it fits most others, to the intersection of
+    /// the lines through their neighbours. This is done only if the intersection is outside the
+    /// range of the model, because then a cell of a tag was mistaken for the corner. Returns which
+    /// corners were moved.
     fn put_back(&self, grid: &mut Grid, refined: &[(Refined, Option<ModelFit>)]) -> Vec<bool> {
         let judged = is_judge(refined);
         let place = |(corner, (_, fit)): (&GridCorner, &(_, Option<ModelFit>))| {
@@ -377,9 +381,9 @@ pub(crate) fn is_sampled(blurs: &[Option<f64>], part: f64) -> bool {
 }
 
 /// Returns the factor of the covariance of a corner for systematic residuals. Residuals beyond the usual noise of the
-/// grid show an object in the image, such as glare or the edge of a cover. Neighbouring pixels then are not
-/// independent. Residuals with the correlation r between neighbours, in rows and in columns, count as ((1 + r)/(1 −
-/// r))² times their variance.
+/// grid show an object in the image, such as glare or the edge of an occluder. Neighbouring pixels
+/// are then not independent. Residuals with the correlation r between neighbours, in rows and in
+/// columns, count as ((1 + r)/(1 − r))² times their variance.
 fn shape_of_residuals(fit: &ModelFit, usual_noise: f64) -> f64 {
     let share = 1.0 - (UNUSUAL * usual_noise / fit.noise()).powi(2);
     let correlation = (1.0 - fit.whiteness).clamp(0.0, MAX_CORRELATED);
@@ -387,8 +391,8 @@ fn shape_of_residuals(fit: &ModelFit, usual_noise: f64) -> f64 {
     1.0 + share.max(0.0) * (together - 1.0)
 }
 
-/// Returns whether the model fits most corners of a grid. It cannot fit edges as sharp as pixels, and must not judge
-/// corners then.
+/// Returns whether the model fits most corners of a grid. It cannot fit edges as sharp as a pixel,
+/// and must not reject corners of these grids.
 fn is_judge(refined: &[(Refined, Option<ModelFit>)]) -> bool {
     let fitted = refined.iter().filter(|(_, fit)| fit.is_some()).count();
     2 * fitted > refined.len()

@@ -66,7 +66,7 @@ pub enum RefineStatus {
     Ok,
     /// The polynomial, because the model does not fit here.
     Polynomial,
-    /// None, because there is no corner: the position is the start.
+    /// None, because there is no corner: the position is the start position.
     Failed,
 }
 
@@ -101,7 +101,7 @@ impl ModelFit {
         self.corner.position
     }
 
-    /// Returns the standard deviation of the residuals, of full scale.
+    /// Returns the standard deviation of the residuals, as a fraction of full scale.
     pub(crate) fn noise(&self) -> f64 {
         self.residual * self.corner.amplitude.abs()
     }
@@ -245,7 +245,7 @@ impl Refiner {
         self.refine_view(image.into(), starts)
     }
 
-    /// Implements [`Self::refine_all`], compiled here instead of in every crate that uses it.
+    /// Implements [`Self::refine_all`] without generics, so that it is compiled only in this crate.
     fn refine_view(&self, image: ImageView, starts: &[DVec2]) -> Vec<Refined> {
         let mut fitter = CornerFitter::default();
         let mut fit = |start: &DVec2| self.refine_with(&mut fitter, image, *start, &self.known);
@@ -319,7 +319,8 @@ impl Refiner {
         if let Some(fit) = model(start) {
             return (fit.into(), Some(fit));
         }
-        // Other edges this near would draw the polynomial away from a start that the finder has already checked.
+        // Other edges this near would pull the polynomial away from a start that the finder has
+        // already checked.
         let found = (room.clear_square_px() >= MIN_POLYNOMIAL_CLEAR_PX)
             .then(|| self.polynomial.refine(image, start, self.iterations))
             .flatten()
@@ -353,8 +354,9 @@ impl Refiner {
         Some((window, fitter.fit(image, window, &first, optics, Accuracy::Full)?.into()))
     }
 
-    /// Fits the model to a corner of a grid, in all of its clear area in the image, with the bends of the grid. The fit
-    /// is accurate to the noise if it starts from a fit `before`; otherwise it is a rough one.
+    /// Fits the model to a corner of a grid, in all of its clear area in the image, with the edge
+    /// curvatures of the grid. The accuracy of the fit is limited by the noise if it starts from a
+    /// fit `before`; otherwise it is a rough fit.
     pub(crate) fn model(
         &self,
         fitter: &mut CornerFitter,
@@ -421,8 +423,8 @@ impl Refiner {
     }
 }
 
-/// Returns the edge nearest to a direction, rotated by 180° if it points the other way. Edges near 180° may have become
-/// the first since the fit.
+/// Returns the edge nearest to a direction, rotated by 180° if it points the other way. Since the
+/// fit, edges near 180° may have become the first ones.
 fn edge_along(edges: &[Edge], angle_rad: f64) -> Edge {
     let off = |edge: &Edge| (edge.angle_rad - angle_rad).sin().abs();
     let nearest = edges.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b)));
@@ -450,7 +452,8 @@ mod tests {
     /// Side of the square of each corner in an image, px.
     const SIDE: usize = 41;
 
-    /// Renders an image of 5 × 5 corners seen from 45°, with light falling to a third. Also returns their positions.
+    /// Renders an image of 5 × 5 corners seen from 45°, with illumination that falls to a third.
+    /// Also returns their positions.
     fn picture(lines: usize, grey: impl Fn(f64) -> f64, noise: f64) -> (Gray<f32>, Vec<DVec2>) {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let normal = Normal::new(0.0, noise).unwrap();

@@ -16,16 +16,19 @@ use deltille_core::detection::{InkEstimate, TONE_PARAMS, ToneEstimate};
 use deltille_core::raster::ImageView;
 use deltille_core::statistics::median;
 
-/// Number of corners that are fitted together. More would determine the curve better than single corners can use it.
+/// Number of corners that are fitted together. More corners would determine the curve more
+/// accurately than single corners need.
 pub(crate) const SAMPLES: usize = 16;
 
-/// Radius of the windows of these corners, px. The common parameters show at the edges, and near the corner.
+/// Radius of the windows of these corners, px. The common parameters affect the pixels at the edges
+/// and near the corner.
 pub(crate) const REACH_PX: f64 = 7.0;
 
 /// The same for a blurred image, in standard deviations of the blur.
 pub(crate) const REACH_SIGMAS: f64 = 5.0;
 
-/// Fraction of its threshold that the first step, from a straight curve, must predict for a group to be estimated.
+/// Minimum evidence at which a group is estimated, as a fraction of its threshold. The first step,
+/// from a straight curve, predicts the evidence.
 const WORTH_ESTIMATING: f64 = 0.5;
 
 impl Optics {
@@ -68,10 +71,10 @@ impl Optics {
         let mut optics = known.clone();
         let mut at = problem.linearised(known);
         let (mut used, mut found) = (Vec::new(), Reported::default());
-        // The first step selects the groups to estimate. Errors of the model there scatter the gradients. They do not
-        // exclude a group, but enter the reported standard deviation. A step from a straight curve reveals little of
-        // effects that are weak beside the curve, and one from a Gaussian little of the effects of motion. So all
-        // groups are tested once more.
+        // The first step selects the groups to estimate. There, model errors scatter the gradients.
+        // They do not exclude a group, but increase the reported standard deviation. A step from a
+        // straight curve reveals little about effects that are weak compared with the curve. A step
+        // from a Gaussian reveals little about motion. So all groups are tested once more.
         for is_first in [true, false] {
             problem.active.clone_from(&problem.all);
             let reduced = problem.reduced(&at, &weights_of(&at.equations));

@@ -9,23 +9,23 @@ use deltille_core::detection::TONE_PARAMS;
 const GROUPS: [&[usize]; 4] = [&[0, 1, 2], &[3, 4], &[HALO], &[INK]];
 
 /// χ² thresholds of three, two and one degrees of freedom: a group is used if noise exceeds its threshold with a
-/// probability below 1 : 1000. Astigmatism is used from 1 : 10 on, because every image is blurred a little more in one
-/// direction, and from a grazing angle that resembles a tone curve.
+/// probability below 1 : 1000. Astigmatism is used from 1 : 10, because every image is blurred
+/// slightly more in one direction. At a grazing angle, this resembles a tone curve.
 const CHI2: [f64; 4] = [16.3, 4.6, 10.8, 10.8];
 
 /// Threshold of one degree of freedom, 1 : 1000.
 const CHI2_OF_ONE: f64 = 10.8;
 
-/// Fraction of the noise from which a curve that displaces no corner is used.
+/// Effect, as a fraction of the noise, above which a curve that displaces no corner is used.
 const NOTICED: f64 = 0.05;
 
-/// Values of all parameters, with the information on the active ones.
+/// Values of all parameters, with the information about the active ones.
 pub(super) struct Estimate {
     pub(super) vector: [f64; PARAMS],
     pub(super) active: Vec<usize>,
     /// The inverse of their covariance.
     pub(super) information: DMatrix<f64>,
-    /// Derivatives of κ₀ by the parameters of the curve.
+    /// Derivatives of κ₀ with respect to the parameters of the curve.
     pub(super) kappa_slopes: [f64; TONE_PARAMS],
     /// Number of pixels in the windows of the corners.
     pub(super) pixels: usize,
@@ -36,8 +36,9 @@ impl Estimate {
         DVector::from_iterator(self.active.len(), self.active.iter().map(|&p| self.vector[p]))
     }
 
-    /// Returns the estimate without the groups whose evidence is below this fraction of the threshold. They are removed
-    /// one by one from the weakest on, because one group may explain another.
+    /// Returns the estimate without the groups whose evidence is below this fraction of the
+    /// threshold. They are removed one by one, the weakest first, because one group may explain
+    /// another.
     pub(super) fn supported(mut self, part: f64) -> Self {
         loop {
             let present =
@@ -52,8 +53,8 @@ impl Estimate {
 
     /// Returns the evidence against a group being zero, in squared standard deviations.
     ///
-    /// The part of a curve besides κ₀ displaces no corner. It occurs in every image whose blur differs a little from
-    /// the model. It counts if it is more than a twentieth of the noise.
+    /// The part of a curve other than κ₀ displaces no corner. It occurs in every image whose blur
+    /// differs a little from the model. It counts if it is more than a twentieth of the noise.
     fn evidence(&self, group: &[usize]) -> f64 {
         let places = |inside: bool| -> Vec<usize> {
             let all = 0..self.active.len();

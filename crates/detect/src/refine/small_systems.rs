@@ -1,7 +1,7 @@
-//! Solves small symmetric systems of equations whose sizes the compiler knows.
+//! Solves small symmetric systems of equations whose sizes are known at compile time.
 //!
-//! An image needs some thousands of them, with ten unknowns. Loops over arrays of fixed size process whole rows at
-//! once.
+//! An image needs a few thousand of them, with ten unknowns. Loops over arrays of fixed size
+//! process whole rows at once.
 
 #![allow(clippy::needless_range_loop, reason = "one index for two rows, so that vectors show")]
 

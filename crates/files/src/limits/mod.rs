@@ -140,7 +140,7 @@ impl fmt::Display for Exceeded {
 #[non_exhaustive]
 pub enum ReadError {
     /// The path is empty.
-    #[error("the file name is empty: name a file, or leave the option out")]
+    #[error("the file name is empty: specify a file, or omit the option")]
     Nameless,
     /// The file cannot be opened or read.
     #[error("cannot read {}: {source}", path.display())]

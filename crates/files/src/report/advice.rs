@@ -116,8 +116,9 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
         let (test, own) = (held_out.rms_px, report.estimate.rms_px);
         let figures = format!("RMS {test:.4} px on held-out views, {own:.4} px on training views");
         if test > HOLDOUT * own {
-            let text =
-                format!("{figures}: the model overfits, or the held-out views differ in kind.");
+            let text = format!(
+                "{figures}: the model overfits, or the held-out views differ systematically from the others."
+            );
             add(Weight::Warning, text);
         } else {
             add(Weight::Good, format!("{figures}."));
@@ -125,7 +126,7 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     }
     if report.print.scale.is_none() {
         let text = format!(
-            "The scale of all distances is that of the print: measure both check bars of the sheet and set {PrintScale}. Focal \
+            "All distances scale with the print: measure both check bars of the sheet and set {PrintScale}. Focal \
              lengths and distortion do not change if both bars have the same scale error."
         );
         add(Weight::Hint, text);
@@ -284,7 +285,7 @@ fn coverage(
     }
     if reach < REACH {
         let (place, length) = match survey.circle {
-            Some(_) => ("near the rim of the image circle", "radius"),
+            Some(_) => ("near the edge of the image circle", "radius"),
             None => ("in the corners of the image", "half diagonal"),
         };
         let text = format!(

@@ -118,7 +118,7 @@ fn in_space(report: &Report) -> String {
     if drawn.iter().all(|(svg, _)| svg.is_empty()) {
         return String::new();
     }
-    section("In space", &figures(drawn))
+    section("3D view", &figures(drawn))
 }
 
 /// The verdict at the top of the page. The most serious piece of advice determines its text, colour and sign.

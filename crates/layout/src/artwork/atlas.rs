@@ -65,7 +65,7 @@ impl Atlas {
         Self { px_per_m, size_px, outlines_mm, placements }
     }
 
-    /// Returns width and height of the image, mm: whole numbers of pixels.
+    /// Returns the width and height of the image, mm: whole numbers of pixels.
     pub fn size_mm(&self) -> DVec2 {
         DVec2::from(self.size_px.map(f64::from)) * (1e3 / f64::from(self.px_per_m))
     }

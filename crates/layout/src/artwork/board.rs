@@ -211,7 +211,8 @@ pub(super) fn tag_outlines(
         .map(move |outline| outline.into_iter().map(|v| DVec2::new(at(v.col), at(v.row))).collect())
 }
 
-/// Returns the outline of a text on its page, mm, scaled down if it exceeds its maximum width.
+/// Returns the outline of a line of text on its page, mm, scaled down if it exceeds its maximum
+/// width.
 pub(super) fn draw_text(label: &SheetText) -> Result<BezPath, text::MissingGlyph> {
     let size = label.cap_height_mm / text::CAP_HEIGHT;
     let (path, width) = text::outline(&label.text.to_string(), size)?;

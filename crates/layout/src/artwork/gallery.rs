@@ -13,7 +13,7 @@ use deltille_core::lattice::{ROW_HEIGHT, TagCells};
 pub struct GalleryTile {
     /// Length of a tag's edge, mm.
     pub edge_mm: f64,
-    /// Black border of a tag, in widths of a bit along the edge.
+    /// Black border of a tag, in bit-widths along the edge.
     pub border_bits: f64,
     /// Number of tags in a row.
     pub columns: usize,

@@ -62,7 +62,7 @@ pub struct Sheet {
     pub width_mm: f64,
     /// Page height, mm.
     pub height_mm: f64,
-    /// Shapes, none of which overlaps another.
+    /// Shapes, which do not overlap.
     pub shapes: Vec<Shape>,
 }
 
@@ -169,7 +169,7 @@ pub enum ArtworkError {
         /// Panel id.
         panel: u32,
     },
-    /// A text contains a character that the built-in font lacks.
+    /// A line of text contains a character that the built-in font lacks.
     #[error(transparent)]
     Text(#[from] text::MissingGlyph),
 }
@@ -178,8 +178,8 @@ impl Printing {
     /// Draws every page of the target, in the page frame, mm.
     ///
     /// # Errors
-    /// Returns an error if the family of the tags is unknown or lacks a code, a sheet shows an unknown panel, or the
-    /// font lacks a character of a text.
+    /// Returns an error if the family of the tags is unknown or lacks a code, a sheet shows an unknown panel,
+    /// or the font lacks a character of a line of text.
     ///
     /// ```
     /// use deltille_layout::Printing;
@@ -218,7 +218,8 @@ pub fn panel_shapes(target: &Target, panel: &Panel) -> Result<Vec<Shape>, Artwor
     board::draw_panel(target, panel, &placement)
 }
 
-/// Returns the outline of a text in the frame of its page, mm; to be filled by the even-odd rule.
+/// Returns the outline of a line of text in the frame of its page, mm; to be filled by the even-odd
+/// rule.
 ///
 /// # Errors
 /// Returns an error if the font lacks a character of the text.

@@ -81,7 +81,7 @@ impl fmt::Display for Label {
 /// Parses the text that [`Display`](fmt::Display) writes for a label.
 impl From<String> for Label {
     fn from(text: String) -> Self {
-        // A text such as "edge 07" does not match the written form, so it stays words.
+        // A text such as "edge 07" does not match the written form, so it remains ordinary text.
         let number = Self::read_number(&text).filter(|label| label.to_string() == text);
         number.unwrap_or(Self::Words(text))
     }

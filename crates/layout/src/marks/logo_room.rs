@@ -33,7 +33,7 @@ pub(crate) struct LogoSize {
 }
 
 impl LogoSize {
-    /// Returns the size of the logo of a paper.
+    /// Returns the requested size of the logo on a paper.
     pub(crate) fn of(paper: &PaperSpec) -> Option<Self> {
         let width = paper.logo.as_ref()?.width();
         Some(Self { width, height_mm: paper.logo_height_mm })
@@ -44,7 +44,8 @@ impl LogoSize {
         self.width
     }
 
-    /// Returns width and height of the logo in a strip of the given `length`, beside `words` of the given length. A
+    /// Returns the width and height of the logo in a strip of the given `length`, beside `words` of
+    /// the given length. A
     /// requested height is used up to `most`. Otherwise the logo is as high as the strip is `deep`, or smaller to leave
     /// room for the words.
     pub(crate) fn in_strip(self, [length, words]: [f64; 2], deep: f64, most: f64) -> DVec2 {
@@ -111,7 +112,7 @@ pub(crate) fn check_sheets(sheets: &[SheetLayout], paper: &PaperSpec) -> Result<
             Err(TargetError::invalid(PaperLogoHeightMm, problem))
         }
         None if least < *HEIGHT_MM.start() => refused(format!(
-            "the logo is {:.1} times as wide as high and would fit only {fitting} high, less than {}: use a larger \
+            "the aspect ratio of the logo is {:.1}, so its height could be only {fitting}, less than {}: use a larger \
              {PaperSize}, or a narrower logo",
             logo.width(),
             format_mm(*HEIGHT_MM.start()),

@@ -44,7 +44,8 @@ const CROP_WIDTH_MM: f64 = 0.15;
 /// Smallest blank strip along the edges of the paper, mm, even with a smaller margin. A pixel at 200 dpi is 0.13 mm,
 /// and the stroke of a bar that touches the edge can be neither measured nor trimmed.
 pub(crate) const MIN_MARGIN_MM: f64 = 0.5;
-/// Smallest edge length proposed to make a board fit, mm: the limit that office printers resolve in a tag.
+/// Smallest edge length proposed to make a board fit, mm: the smallest that office printers resolve
+/// in a tag.
 const MIN_PROPOSED_MM: u32 = 5;
 
 /// Bounding rectangle of a panel's ink, and the blank space it needs, mm.
@@ -312,7 +313,7 @@ impl Arrangement {
         })
     }
 
-    /// Returns whether a text overlaps the logo of its sheet.
+    /// Returns whether a line of text overlaps the logo of its sheet.
     pub(crate) fn logo_meets(&self, sheet: &SheetLayout, text: &SheetText) -> bool {
         let box_of = |at: DVec2, angle_rad: f64, size: DVec2| {
             let turn = DVec2::from_angle(angle_rad);
@@ -349,7 +350,7 @@ impl Arrangement {
         marks.map(line).collect()
     }
 
-    /// Returns width and height of the page, mm.
+    /// Returns the width and height of the page, mm.
     pub(crate) fn page_mm(&self) -> DVec2 {
         self.page
     }

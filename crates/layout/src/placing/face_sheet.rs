@@ -48,15 +48,15 @@ const EDGE_CAP_MM: f64 = 2.2;
 /// Capital height and line spacing of the instructions, mm.
 const WORDS_MM: [f64; 2] = [2.0, 3.4];
 /// Instructions below the number of the face.
-const WORDS: [&str; 3] = ["Cut from mark to mark.", "Edges of the same", "number meet."];
+const WORDS: [&str; 3] = ["Cut from mark to mark.", "Edges with equal", "numbers meet."];
 /// Height of the number of a face and the instructions below it, mm.
 const WORDS_HEIGHT_MM: f64 = FACE_CAP_MM + WORDS_MM[0] / 2.0 + WORDS.len() as f64 * WORDS_MM[1];
 /// Gap between the marks of a face and the marks along the page margins, mm.
 const MARK_BLANK_MM: f64 = 1.5;
 /// Capital height of the number on a face as a fraction of the margin width, and its maximum, mm.
 const INNER_CAP: (f64, f64) = (0.35, 2.0);
-/// Position of the number on a triangle, along the bisector of its lower-left corner, in margin widths. On other faces
-/// it is half as far as the inner corner of the margin.
+/// Position of the number on a triangle, along the bisector of its lower-left corner, in margin widths.
+/// On other faces, the number is halfway to the inner corner of the margin.
 const INNER_PLACE: f64 = 0.9;
 
 /// Lays out the faces of a solid, one sheet each.
@@ -228,7 +228,7 @@ pub fn upright_number(number: usize) -> String {
     if rotations { text + "." } else { text }
 }
 
-/// Lays out a text along the middle of an edge, with its baseline `inwards` from the edge.
+/// Lays out a line of text along the middle of an edge, with its baseline `inwards` from the edge.
 pub fn edge_text(
     placement: &Placement,
     [a, b]: [DVec2; 2],

@@ -11,7 +11,7 @@ pub(super) const LABEL_CAP_MM: f64 = 2.2;
 /// Length of a bar's end strokes, across the bar, mm: long enough to align a ruler, short enough to leave room for the
 /// text.
 pub const CHECK_BAR_STROKE_MM: f64 = 2.0;
-/// Depth of descenders such as in g below the baseline, in capital heights.
+/// Depth of descenders, for example of g, below the baseline, in capital heights.
 const DESCENT_CAPS: f64 = 0.33;
 /// Gap between the ends of a bar and its text, mm.
 pub(super) const BAR_INDENT_MM: f64 = 3.0;

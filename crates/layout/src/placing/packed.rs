@@ -37,8 +37,8 @@ const CUT_GAP_MM: f64 = 0.5;
 /// Width of cutting lines, mm.
 const LINE_MM: f64 = 0.15;
 
-/// Phase offset between adjacent boards, as a fraction of the distance between rows or columns of tiles. The golden
-/// section keeps boards farther apart out of phase, too.
+/// Phase offset between adjacent boards, as a fraction of the distance between rows or columns of tiles.
+/// With the golden section, boards that are farther apart are also out of phase.
 const OUT_OF_STEP: f64 = 0.382;
 
 /// Layout of a board in its part of a sheet.
@@ -49,7 +49,8 @@ struct Cell {
     blank: f64,
     /// Its size, mm.
     size: DVec2,
-    /// Lower ends of the lines of its label, measured from the lower end of the cell, from above, mm.
+    /// Lower ends of the lines of its label, from top to bottom, measured from the lower end of the
+    /// cell, mm.
     lines: Vec<f64>,
     /// Size of the logo beside the label, mm.
     logo: Option<DVec2>,
@@ -150,7 +151,7 @@ pub(crate) fn fits(spec: &BoardSpec, paper: &PaperSpec) -> bool {
 }
 
 /// Chooses the columns and rows of a page, at most as many as there are boards, and their position. Uses the smallest
-/// paper that fits one board, in the orientation that fits most.
+/// paper that fits one board, in the orientation that fits the most boards.
 fn arrange(
     cell: &Cell,
     boards: usize,

@@ -188,7 +188,7 @@ impl Poster {
         DVec2::new(right - left, upper - lower)
     }
 
-    /// Returns width and height of the sheet, mm.
+    /// Returns the width and height of the sheet, mm.
     fn size_mm(&self) -> DVec2 {
         let [columns, rows] = self.counts.map(|count| count as f64);
         (self.window_size() - OVERLAP_MM) * DVec2::new(columns, rows) + OVERLAP_MM
@@ -349,14 +349,14 @@ impl Poster {
 /// Returns the instructions for a page that has pages with these numbers on its left and above.
 fn joining(left: Option<usize>, above: Option<usize>) -> String {
     let (line, pages) = match (left, above) {
-        (None, None) => return "Lay this page down; the next ones are glued on it.".to_owned(),
+        (None, None) => return "Start with this page; glue the next ones onto it.".to_owned(),
         (Some(left), None) => ("the line on the left", format!("page {left}")),
         (None, Some(above)) => ("the line above", format!("page {above}")),
         (Some(left), Some(above)) => {
             ("the lines on the left and above", format!("pages {left} and {above}"))
         }
     };
-    format!("Trim along {line}; glue it on {pages}, its edge on the ticks, cross on cross.")
+    format!("Trim along {line}; glue onto {pages}. Align the edge with the ticks, and the crosses.")
 }
 
 /// Converts all printed marks of a sheet to convex polygons.

@@ -13,7 +13,7 @@ use deltille_core::targets::{
     AprilGridSpec, CharucoSpec, CirclesSpec, Panel, Target, TargetError, TargetSpec, fingerprint,
 };
 
-/// Smallest size proposed to make a target fit, mm: the limit that office printers resolve.
+/// Smallest size proposed to make a target fit, mm: the smallest that office printers resolve.
 const MIN_PROPOSED_MM: u32 = 5;
 
 /// A panel whose size is determined by one length.

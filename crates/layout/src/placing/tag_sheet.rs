@@ -80,8 +80,8 @@ pub(crate) fn sheets(
     Ok(sheets.collect())
 }
 
-/// Chooses the columns and rows of a page, at most as many as there are tags, and their position. Uses the orientation
-/// that fits most tags.
+/// Chooses the columns and rows of a page, at most as many as there are tags, and their position.
+/// Uses the orientation that fits the most tags.
 fn arrange(
     spec: &TagSheetSpec,
     blanks: &Blanks,

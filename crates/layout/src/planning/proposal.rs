@@ -14,7 +14,8 @@ const FILLED: f64 = 0.9;
 const LEAST: [u32; 2] = [4, 5];
 const MOST: u32 = 40;
 
-/// Cell size of a position code from which patches of three by four tiles are labelled in sharp images, px. Measured on
+/// Smallest cell size of a position code at which patches of three by four tiles are labelled in
+/// sharp images, px. Measured on
 /// photographs of printed pages (docs/benchmarks.md). Tilted cells need the same height, because a patch has no
 /// redundant cells.
 const PATCH_BIT_PX: f64 = 1.4;
@@ -40,13 +41,15 @@ pub struct Proposal {
     pub spec: BoardSpec,
     /// Its size, tags and distances.
     pub reach: Reach,
-    /// Distance from which a board facing the camera is entirely visible, mm. At shorter distances, parts of a tagged
+    /// Smallest distance at which a board facing the camera is entirely visible, mm. At shorter
+    /// distances, parts of a tagged
     /// board are still labelled.
     pub whole_from_mm: f64,
 }
 
 impl Proposal {
-    /// Returns the distance up to which a patch of three by four tiles of a place-code board is labelled in sharp
+    /// Returns the distance up to which a patch of three by four tiles of a position-code board is
+    /// labelled in sharp
     /// images, mm. `focal_px` is the focal length and `tilt_rad` the tilt of the board. Returns `None` for other
     /// boards.
     pub fn patches_to_mm(&self, focal_px: f64, tilt_rad: f64) -> Option<f64> {
@@ -62,8 +65,8 @@ impl Proposal {
 pub enum Unsuited {
     /// Tiles large enough for the farthest distance leave no room for a board in the image.
     #[error(
-        "tiles must be {edge_mm:.0} mm long to be read from {far_mm:.0} mm, but the image there shows fewer than 4 × 5 \
-         corners of them: use a camera with more pixels, a wider lens, less tilt or a shorter distance"
+        "tiles must be {edge_mm:.0} mm long to be readable at {far_mm:.0} mm, but at this distance fewer than \
+         4 × 5 corners fit into the image: use a camera with more pixels, a wider lens, less tilt or a shorter distance"
     )]
     Picture {
         /// Edge of a tile, mm.
@@ -73,8 +76,8 @@ pub enum Unsuited {
     },
     /// The tiles do not fit on the paper.
     #[error(
-        "tiles must be {edge_mm:.0} mm long to be read from {far_mm:.0} mm, but the paper fits fewer than 4 × 5 corners \
-         of them: use larger paper, or print a poster"
+        "tiles must be {edge_mm:.0} mm long to be readable at {far_mm:.0} mm, but fewer than 4 × 5 corners fit \
+         on the paper: use larger paper, or print a poster"
     )]
     Paper {
         /// Edge of a tile, mm.

@@ -12,7 +12,8 @@ pub(super) const COMFORTABLE_BIT_PX: f64 = 2.0;
 /// The same for the tile edge of a board without tags, px.
 pub(super) const COMFORTABLE_EDGE_PX: f64 = 1.25 * MIN_UNTAGGED_EDGE_PX;
 
-/// Size of a tag cell from which boards are labelled in sharp images, px: half of the views are labelled at 1.25,
+/// Smallest size of a tag cell at which boards are labelled in sharp images, px: half of the views
+/// are labelled at 1.25,
 /// nearly all at 5 % more. Tilted cells need the same area.
 const MIN_BIT_PX: f64 = 1.3;
 

@@ -3,7 +3,8 @@
 //! The corner consists of K lines through a point of a plane, seen by a camera that is tilted by φ about an axis at α.
 //! The image angles are atan2(sin(a − α), −cos φ · cos(a − α)) for a = 0°, 60°, 120° or 0°, 90°. Levels are multiplied
 //! by a linear illumination, then the image is blurred. Each pixel is the mean over its square, by Gauss–Legendre
-//! quadrature of the closed form of the blurred image: exact to 10⁻⁵ of full scale for blurs from 0.4 px (tests).
+//! quadrature of the closed form of the blurred image: exact to 10⁻⁵ of full scale for blurs of 0.4
+//! px or more (tests).
 //!
 //! ```
 //! use deltille_layout::synth::SimulatedCorner;
@@ -20,12 +21,12 @@ use glam::DVec2;
 
 use deltille_core::raster::Gray;
 
-/// Number of quadrature nodes along each side of a pixel, on −1 … 1. The second rule is used for blurs sharper than
-/// [`SMOOTH_BLUR_PX`].
+/// Number of quadrature nodes along each side of a pixel, on −1 … 1. The second rule is used for
+/// blurs smaller than [`SMOOTH_BLUR_PX`].
 const SMOOTH_RULE: usize = 3;
 const SHARP_RULE: usize = 6;
 
-/// Blur from which the smaller rule is accurate enough, px.
+/// Smallest blur for which the smaller rule is accurate enough, px.
 const SMOOTH_BLUR_PX: f64 = 0.9;
 
 /// Number of lines of a deltille corner.
@@ -47,7 +48,7 @@ pub struct SimulatedCorner {
     pub amplitude: f64,
     /// Grey value midway between dark and bright, as a fraction of full scale.
     pub level: f64,
-    /// Relative change of illumination per pixel, 0 in `light_centre`.
+    /// Change of the relative illumination per pixel; the total change is 0 at `light_centre`.
     pub slope: DVec2,
     /// Position at which the relative illumination is 1, px.
     pub light_centre: DVec2,

@@ -1,8 +1,8 @@
 //! Synthetic images of a target, with exact ground truth.
 //!
 //! 1. `surface`: paper with black areas; `sheet` and `solid` build surfaces from a printed sheet and a target;
-//! 2. `scene`: surfaces in front of a camera, rendered with illumination, blur and noise; `occlusion`: the parts they
-//!    hide of each other;
+//! 2. `scene`: surfaces in front of a camera, rendered with illumination, blur and noise;
+//!    `occlusion`: the parts that they hide from view;
 //! 3. `corner`: one ideal corner on its own.
 //!
 //! Outlines are projected edge by edge, and their area in every pixel is computed, not sampled

@@ -7,7 +7,8 @@ use deltille_core::targets::{Panel, Target, TargetSpec};
 
 /// Returns the scene of a target: the faces of a solid at their poses, or boards cut out along their quiet zone.
 ///
-/// The boards of one target are loose sheets that all lie in its origin, so only a target with a single board is
+/// The boards of one target are loose sheets that all lie at its origin, so only a target with a
+/// single board is
 /// meaningful.
 ///
 /// # Errors

@@ -30,12 +30,14 @@ pub struct Arranger {
     black_distance: u32,
     white_distance: u32,
     free_centre: bool,
-    /// Number of differing pairs that a partially counted word may lack, and the fraction as which it counts.
+    /// Number of differing pairs that a partially counted word may lack, and its contribution to
+    /// the count.
     nearly: Option<(u32, f64)>,
     /// Sums of two words of the code that may be too light with hidden cells, one of each orbit.
     sums: Vec<u64>,
     screen: Screen,
-    /// Cycles of the tag whose cells are free. The last cycles of the code, which it does not use, are there.
+    /// Cycles of the tag whose cells are free. The last cycles of the code, which it does not use,
+    /// are assigned to them.
     free_cycles: Vec<u8>,
     is_centre_free: bool,
 }
@@ -87,8 +89,9 @@ impl Arranger {
         }
     }
 
-    /// Takes sums of two words of the code, in cycle coordinates, into account, which hidden cells may make too
-    /// light. Of n words, at least n / (1 + s) are compatible if s sums are too light.
+    /// Takes into account sums of two words of the code, in cycle coordinates. Hidden cells may
+    /// make these sums too light. Of n words, at least n / (1 + s) are compatible if s sums are too
+    /// light.
     pub fn with_sums(mut self, mut sums: Vec<u64>) -> Self {
         sums.retain(|&word| self.space.canonical(word) == word);
         self.sums = sums;
@@ -106,8 +109,9 @@ impl Arranger {
         1.0 / (1.0 + light as f64)
     }
 
-    /// Counts a word that lacks up to `pairs` differing pairs as the fraction `worth` of one, for the annealing only:
-    /// if the code has distance to spare, changing one cell may repair the word.
+    /// Counts a word that lacks up to `pairs` differing pairs as the fraction `worth` of a word,
+    /// for the annealing only. If the code has distance to spare, changing one cell may repair the
+    /// word.
     pub fn with_nearly(mut self, pairs: u32, worth: f64) -> Self {
         self.nearly = Some((pairs.min(self.min_pairs), worth));
         self
@@ -239,8 +243,8 @@ impl Arranger {
         let mut weights = self.weights(now.inverted);
         let mut score = self.worth(&now, &weights);
         let mut best = (score, now.clone());
-        // The temperature decreases geometrically from the random standard deviation of a score to that of single
-        // words.
+        // The temperature decreases geometrically from the standard deviation of random scores to
+        // that of single words.
         let hot = (self.words.len() as f64).sqrt().max(2.0) * 0.5;
         for step in 0..steps {
             if halt() {
@@ -265,8 +269,9 @@ impl Arranger {
 
 /// Returns the words of a slice that have at least `min_pairs` pairs of differing neighbours, as a bit slice.
 ///
-/// Counting starts at 64 − `min_pairs` and adds one for each differing pair, so it overflows into bit 6 exactly if
-/// there are enough. With the 84 pairs of 64 cells, it overflows from 128 into bit 7. Seven full adders process eight
+/// Counting starts at 64 − `min_pairs` and adds one for each differing pair, so it overflows into
+/// bit 6 if and only if there are enough. With the 84 pairs of 64 cells, it overflows from 128 into
+/// bit 7. Seven full adders process eight
 /// pairs at a time.
 fn enough(
     edges: &[(u8, u8, u64)],

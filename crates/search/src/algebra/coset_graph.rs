@@ -1,6 +1,7 @@
 //! Unions of cosets of an invariant linear code K, by clique search.
 //!
-//! Two cosets of K are at distance h or more exactly if the sum of their syndromes is not the syndrome of a word
+//! Two cosets of K are at distance h or more if and only if the sum of their syndromes is not the
+//! syndrome of a word
 //! lighter than h. All syndromes of such words are marked once. A code K ∪ (K+a) ∪ … with distance h is then a set of
 //! syndromes that contains 0 and whose pairwise sums are all unmarked: a clique in a Cayley graph (an independent set
 //! in its complement). Its vertices here are whole orbits of syndromes under the rotation, so that the union is
@@ -19,8 +20,8 @@ use super::clique::Cliques;
 /// Largest number of syndrome bits; the table of marked syndromes then takes 16 MiB.
 pub const MAX_SYNDROME_BITS: u32 = 27;
 
-/// The compatibility graph of the cosets of one code. Vertices are orbits of cosets that keep the distance; edges
-/// join those that keep it from each other.
+/// The compatibility graph of the cosets of one code. Vertices are orbits of cosets that keep the distance;
+/// edges join those that keep the distance between each other.
 #[derive(Clone, Debug)]
 pub struct CosetGraph {
     space: CycleSpace,
@@ -108,14 +109,16 @@ impl CosetGraph {
             && !self.is_marked(a ^ self.rotate(once))
     }
 
-    /// Returns a large union, grown from one random start. Vertices are added one by one, each time the one of a few
-    /// random candidates that leaves the most possible words. When few are left, branch and bound finds the heaviest
+    /// Returns a large union, grown from one random start. Vertices are added one by one. Each step
+    /// compares a few random candidates and adds the one that leaves the most possible words. When
+    /// few are left, branch and bound finds the heaviest
     /// clique of these, unless `halt` returns true. The result depends only on `seed`, unless `halt` ended the
     /// search.
     pub fn grow(&self, seed: u64, halt: impl Fn() -> bool) -> CosetUnion {
         /// Number of candidates that are compared before each choice.
         const LOOK_AT: usize = 12;
-        /// Number of vertices that count as few, and number of branches searched.
+        /// Number of vertices below which branch and bound is used, and number of branches
+        /// searched.
         const FEW: usize = 800;
         const NODES: u32 = 4_000;
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -185,7 +188,7 @@ fn mark(
     marked: &mut [u64],
     halt: &dyn Fn() -> bool,
 ) -> bool {
-    /// Remaining weight at which `halt` is called: some ten thousand sums lie between two calls.
+    /// Remaining weight at which `halt` is called: about ten thousand sums lie between two calls.
     const LOOK_AT: u32 = 4;
     marked[sum as usize / 64] |= 1 << (sum % 64);
     if weight == 0 {

@@ -10,7 +10,8 @@ use crate::joint::{AllWords, Joint};
 use deltille_core::family::algebra::{Arrangement, CosetUnion, has_free_centre};
 use deltille_core::family::{Control, Screen};
 
-/// Maximum number of words by which an arrangement is judged: a sample of very many is sufficient.
+/// Maximum number of words from which an arrangement is scored. If there are more, a sample is
+/// sufficient.
 pub(super) const JUDGED_WORDS: usize = 30_000;
 
 /// A union and its arrangement.
@@ -27,9 +28,10 @@ pub(super) struct Candidate {
     pub(super) codes: Vec<u64>,
 }
 
-/// The candidate with the most guaranteed codes so far; the codes that progress reports announce can also be written.
+/// The candidate with the most guaranteed codes so far; it ensures that the result has the number
+/// of codes that progress reports state.
 pub(super) struct Surest {
-    /// Number of codes known without it.
+    /// Number of codes known without the candidate.
     pub(super) known: usize,
     pub(super) candidate: Option<Candidate>,
 }
@@ -137,7 +139,7 @@ impl Best {
     ) {
         /// Number of candidates that are refined.
         const KEPT: usize = 3;
-        /// Steps of the first round; each further round has half as many more.
+        /// Steps of the first round; each further round has 50 % more than the previous one.
         const STEPS: u32 = 60;
         let until = spent.until(share);
         let over = || is_past(until) || control.is_cancelled();

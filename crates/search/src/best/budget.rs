@@ -49,7 +49,8 @@ impl Spent {
         Self { start: budget.now(), budget, first, done: AtomicU64::new(0), total }
     }
 
-    /// Returns the time when a fraction of the budget after the first one is spent; `None` for a budget of work.
+    /// Returns the time when the given fraction of the rest of the budget is spent, after the
+    /// fraction `first`; `None` for a budget of work.
     pub(super) fn until(&self, share: f64) -> Option<End> {
         match self.budget {
             Budget::Time(time, clock) => {
@@ -60,7 +61,8 @@ impl Spent {
         }
     }
 
-    /// Returns the number of rounds of a kind: at most the steps of work, or as many as the time allows.
+    /// Returns the number of rounds of a phase: the steps of a budget of work, or `most` for a
+    /// budget of time.
     pub(super) fn rounds(&self, most: u64) -> u64 {
         match self.budget {
             Budget::Time(..) => most,
@@ -98,7 +100,7 @@ impl End {
     }
 }
 
-/// Returns whether an end has passed; without one it never does.
+/// Returns whether an end has passed; false if there is none.
 pub(super) fn is_past(end: Option<End>) -> bool {
     end.is_some_and(|end| (end.clock)() >= end.at)
 }

@@ -46,9 +46,9 @@ impl Best {
         self.resume(name, start, &mut Checkpoint::default(), &|_| (), control)
     }
 
-    /// Like [`Self::family`], but resumes from a checkpoint and calls `save` after each leg. After cancelling, the
-    /// checkpoint of a search by work contains the completed legs, that of a search by time also the result of the
-    /// interrupted one.
+    /// Like [`Self::family`], but resumes from a checkpoint and calls `save` after each leg. After
+    /// cancelling, the checkpoint contains the completed legs. In a search by time, it also
+    /// contains the result of the interrupted one.
     ///
     /// # Errors
     /// Like [`Self::family`], and returns an error if the checkpoint is inconsistent.
@@ -122,7 +122,7 @@ impl Best {
             Budget::Time(time, clock) => {
                 let left =
                     time.saturating_sub(Duration::try_from_secs_f64(checkpoint.seconds).ok()?);
-                // A leg too short to find anything would not make up for an overrun.
+                // A leg too short to find anything is not worth exceeding the budget.
                 let over = checkpoint.legs_done > 0 && left < time.mul_f64(0.02).max(SHORTEST / 60);
                 let leg = SHORTEST.max(time / 10);
                 let leg = if left < leg.mul_f64(1.5) { left } else { leg };

@@ -1,6 +1,6 @@
-//! The best of all methods within a time limit. It starts from the best construction on record and sources of
-//! invariant codes, arranges them on the tag so that as many words as possible satisfy the rules, and repairs and
-//! extends them by local search.
+//! The best of all methods within a time limit. It starts from the best construction on record and
+//! from sources of invariant codes. It arranges them on the tag so that the number of words that
+//! satisfy the rules is largest. Local search repairs and extends them.
 //!
 //! The result depends on the time, so it is recorded in full
 //! ([`AlgebraicConstruction`](deltille_core::family::algebra::AlgebraicConstruction)) and gives the same codes again

@@ -185,7 +185,7 @@ fn with_exchanged(
     if found.len() >= codes.len() {
         return Ok((found, construction));
     }
-    // With hidden cells, words taken in order can be different ones.
+    // With hidden cells, taking words in order may give other codes.
     let listed = codes.iter().map(|&word| words.hex(word)).collect();
     let construction = AlgebraicConstruction { exchanged: listed, ..construction };
     Ok((construction.codes(screen)?, construction))

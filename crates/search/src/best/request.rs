@@ -48,13 +48,13 @@ impl Best {
         Self { dimension, distance, rules, budget, seed: 0, limit: None, exchange: true }
     }
 
-    /// Sets other rules for single codes.
+    /// Sets the rules for single codes.
     #[must_use]
     pub fn rules(self, rules: Rules) -> Self {
         Self { rules, ..self }
     }
 
-    /// Sets another seed.
+    /// Sets the seed.
     #[must_use]
     pub fn seed(self, seed: u64) -> Self {
         Self { seed, ..self }
@@ -122,7 +122,8 @@ impl Best {
         Family::new(name, self.dimension, self.distance, codes, rules, construction)
     }
 
-    /// Returns the space in which codes are drawn: without the free cells, which are its last cycles.
+    /// Returns the space in which codes are drawn. It excludes the free cells, which are the last
+    /// cycles.
     pub(super) fn space(&self) -> CycleSpace {
         let whole = CycleSpace::of(self.dimension);
         let free = self.rules.free.map_or(0, |free| free.mask(self.dimension).count_ones());

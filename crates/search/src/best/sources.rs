@@ -36,7 +36,8 @@ struct Draw {
 }
 
 impl Best {
-    /// Draws unions of cosets until a fraction of the time is over; returns the most promising first.
+    /// Draws unions of cosets until a fraction of the time has elapsed; returns the most promising
+    /// first.
     pub(super) fn sources(
         &self,
         spent: &Spent,
@@ -98,7 +99,8 @@ impl Best {
         }
     }
 
-    /// Makes one draw, with a quick arrangement if it has almost the most orbits so far.
+    /// Makes one draw, with a quick arrangement if its number of orbits is close to the largest so
+    /// far.
     fn candidate(
         &self,
         seed: u64,
@@ -130,7 +132,8 @@ impl Best {
         Draw { orbits: count, shape, candidate }
     }
 
-    /// Returns the extended BCH code of most dimensions that has the distance and leaves free central cells unused.
+    /// Returns the extended BCH code with the most dimensions that has the distance and leaves free
+    /// central cells unused.
     /// With hidden cells, its light words must be few enough to be listed. Returns `None` for other tags, or if a
     /// rotation moves none of its words.
     fn bch_code(&self) -> Option<(String, Span)> {
@@ -168,7 +171,7 @@ impl Best {
         if let Some((source, code)) = self.bch_code() {
             return Some((source, code, None));
         }
-        // A random code of 49 bits takes long to check and is far smaller.
+        // Checking a random code of 49 bits takes a long time, and the code is far smaller.
         let only_residue = self.dimension.bits() > 36;
         if (draw.is_multiple_of(4) || only_residue) && !primes.is_empty() {
             let q = *primes.choose(random).expect("not empty");

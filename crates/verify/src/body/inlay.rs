@@ -234,8 +234,8 @@ fn wrong_shape(
         let wrong = triangles.par_iter().find_first(is_wrong)?;
         let [x, y, z] = (wrong.iter().sum::<DVec3>() / 3.0).to_array();
         Some(format!(
-            "{name} body: a triangle around ({x:.2}, {y:.2}, {z:.2}) mm that is neither on a face nor a wall or the floor \
-             of the inlay"
+            "{name} body: a triangle around ({x:.2}, {y:.2}, {z:.2}) mm that is not on a face, a wall or the \
+             floor of the inlay"
         ))
     })
 }

@@ -54,7 +54,7 @@ pub fn about(of: &Family, other: &Family, result_format: ResultFormat) -> anyhow
         say!("  {corrected:<32}  {direct:>10}  {mirrored:>12}");
     }
     say!(
-        "  {} corrects {t} cells, {} {u}: pairs at most this far apart can be confused",
+        "  {} corrects {t} cells, {} {u}: pairs within this distance can be confused",
         of.name(),
         other.name()
     );

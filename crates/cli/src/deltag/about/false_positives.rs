@@ -25,7 +25,7 @@ pub fn add_to(described: &mut Value, family: &Family) {
 /// Prints both rates for each number of corrected cells.
 pub fn print(family: &Family) -> anyhow::Result<()> {
     let natural = family.natural_false_positive_rates();
-    say!("  probability that a triangle with a border that is not a tag is accepted as one");
+    say!("  probability that a triangle with a border, but without a tag, is accepted as a tag");
     say!("    random bits   natural images  when correcting");
     for (corrected, rate) in family.false_positive_rates().iter().enumerate() {
         let natural =

@@ -12,7 +12,7 @@ use deltille::family::search::best::{Best, Budget};
 use deltille::family::{RuleChoice, Rules, best_rule, rule_choices};
 
 /// Text at the end of `--help`.
-pub const HELP: &str = "Evaluates the best known construction, the one gen-family starts from. The rule marked \
+pub const HELP: &str = "Evaluates the best known construction, from which gen-family starts. The rule marked \
     \"chosen\" is the one that `gen-family --false-positives` uses.";
 
 #[derive(clap::Args)]
@@ -28,12 +28,13 @@ pub struct Args {
 /// Selection of the best rule.
 #[derive(clap::Args)]
 pub struct ChoiceArgs {
-    /// Select the complexity rule that leaves the most codes at this natural false-positive rate per black-bordered
-    /// triangle in the image, such as 1e-4, with --corrects cells corrected
+    /// Select the complexity rule that keeps the most codes without exceeding this false-positive
+    /// rate per black-bordered triangle in natural images, such as 1e-4, with --corrects cells
+    /// corrected
     #[arg(long, value_name = "RATE", allow_negative_numbers = true,
           value_parser = crate::values::number(1e-15..=1.0))]
     pub false_positives: Option<f64>,
-    /// Number of cells corrected in a single tag [default: half of what the distance allows]
+    /// Number of cells corrected in a single tag [default: half of the maximum for this distance]
     #[arg(long, value_name = "CELLS", requires = "false_positives", allow_negative_numbers = true,
           value_parser = crate::values::whole(0..=31u32))]
     pub corrects: Option<u32>,

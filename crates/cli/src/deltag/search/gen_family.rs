@@ -39,8 +39,8 @@ pub const HELP: &str = "Ctrl-C ends a search early. The methods best and algebra
     (130). A second Ctrl-C ends the program immediately.";
 
 /// Help text of `--force`.
-pub const FORCE: &str = "Also overwrite a family file that has more codes, another size or another distance, and \
-    existing files of any other type";
+pub const FORCE: &str = "Also overwrite a family file that has more codes, a different number of bits or a \
+    different distance, and existing files of any other type";
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -59,7 +59,7 @@ pub struct Args {
     #[arg(long, value_name = "STEPS", conflicts_with = "time", allow_negative_numbers = true,
           value_parser = whole(1..=1_000_000u32))]
     work: Option<u32>,
-    /// Start from scratch instead of the shipped family (methods best and algebraic)
+    /// Start from an empty family instead of the shipped one (methods best and algebraic)
     #[arg(long, alias = "from-nothing")]
     from_scratch: bool,
     /// Extend this family without a search: keep its codes and ids, and append the known codes that satisfy the rules
@@ -69,11 +69,11 @@ pub struct Args {
     /// Seed of the random number generator of best, algebraic and search [default: 1]
     #[arg(long, allow_negative_numbers = true, value_parser = whole(0..=u64::MAX))]
     seed: Option<u64>,
-    /// Largest number of rounds of the method search [default: 3, or unlimited with --time]
+    /// Maximum number of rounds of the method search [default: 3, or unlimited with --time]
     #[arg(long, allow_negative_numbers = true, value_parser = whole(1..=1_000_000u32))]
     rounds: Option<u32>,
-    /// Largest number of codes, for best and algebraic [default: as many as fit in a file of 64 MiB; 20,000 for 49
-    /// and 64 bits with --robust-to]
+    /// Maximum number of codes, for best and algebraic [default: as many as fit in a file of 64
+    /// MiB; 20,000 for 49 and 64 bits with --robust-to]
     #[arg(long, value_name = "CODES", allow_negative_numbers = true,
           value_parser = whole(1..=u64::MAX))]
     limit: Option<u64>,
@@ -100,11 +100,12 @@ pub struct Args {
 
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 enum Method {
-    /// Known and other codes, arranged and improved by local search within --time
+    /// Known and newly constructed codes, rearranged and improved by local search within --time
     Best,
     /// Algebraic codes; only the assignment of code positions to cells is optimised, within --time
     Algebraic,
-    /// Local search from nothing, up to 25 bits; reproducible for the same seed and number of rounds
+    /// Local search from an empty family, up to 25 bits; reproducible for the same seed and number
+    /// of rounds
     Search,
     /// Construction of the published families, up to 36 bits
     Lexicode,
@@ -152,7 +153,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Parameters { dimension, distance } = args.family;
     let name = args.name.clone().unwrap_or_else(|| format!("d{}h{distance}", dimension.bits()));
     let path = output::file(&args.output, &name, "json")?;
-    interrupt::set_status("nothing was found yet; nothing was written");
+    interrupt::set_status("no codes were found; nothing was written");
     if let Err(FamilyError::Claim { problem, .. }) = check_name(&name, dimension, distance) {
         bail!("--name: {problem}");
     }
@@ -511,7 +512,7 @@ impl Args {
             }),
             Ok(family) => Ok(Outcome::whole(family)),
             Err(FamilyError::Cancelled) if stopped() => {
-                let message = "nothing was found yet; nothing was written".to_owned();
+                let message = "no codes were found; nothing was written".to_owned();
                 Ok(Outcome::interrupted(None, message))
             }
             // The time limit passed before the first code was found.

@@ -19,7 +19,7 @@ pub struct RuleArgs {
     #[arg(long, value_name = "CELLS", allow_negative_numbers = true,
           value_parser = crate::values::whole(0..=64u32))]
     black_distance: Option<u32>,
-    /// Require every code to differ from the all-white tile in at least h cells
+    /// Require the distance of every code from the all-white tile to be at least that of the family
     #[arg(long)]
     reject_white: bool,
     /// Minimum distance under erasures: apex (the 4 cells at any one corner), edge (the cells along any one edge) or

@@ -172,7 +172,7 @@ fn pairs<'a>(
     };
     ensure!(
         !pairs.is_empty(),
-        "no camera is in both: {first_path} has {}, {second_path} has {}; compare two calibrations of the same rig or \
+        "no camera is in both calibrations: {first_path} has {}, {second_path} has {}; compare two calibrations of the same rig or \
          of the same camera",
         names(first),
         names(second)
@@ -218,7 +218,7 @@ fn describe(camera: &CameraEstimate, found: &Comparison, tolerance: f64) -> Stri
     let meaning = match found.rms_px <= tolerance {
         true => format!("within the tolerance of {tolerance} px"),
         false => {
-            "the camera has changed, or its model or the board does not fit in both".to_owned()
+            "the camera has changed, or the model or the board does not fit in one of the calibrations".to_owned()
         }
     };
     let verdict_of = |found: &Comparison| Verdict::of(std::slice::from_ref(found), &[], tolerance);

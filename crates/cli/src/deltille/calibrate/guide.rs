@@ -42,7 +42,7 @@ const GIVEN_UP: Duration = Duration::from_secs(3);
 /// Arguments of `deltille guide`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Folder in which another program, such as a camera's, saves photographs
+    /// Folder to which another program, such as the camera's software, saves photographs
     folder: PathBuf,
     /// Target description: the .json written with the target, or a .dsc
     #[arg(long, required_unless_present = "grid", value_name = "FILE")]
@@ -52,13 +52,14 @@ pub struct Args {
     /// Camera model to calibrate: radtan, radtan5, rational, thin-prism, kannala-brandt …, as in `deltille calibrate`
     #[arg(long, default_value = "radtan", conflicts_with = "camera")]
     model: ModelChoice,
-    /// Camera file with approximate parameters to start from; all are calibrated again
+    /// Camera file with initial values; all parameters are estimated again
     #[arg(long, value_name = "FILE")]
     camera: Option<PathBuf>,
     /// Also estimate how the board is bent, and choose views for that
     #[arg(long, conflicts_with = "shape")]
     board_shape: bool,
-    /// Nearest distance at which the board can be held in focus, such as 30cm [default: half the board's diagonal]
+    /// Shortest distance at which the board is in focus, such as 30cm [default: half the board's
+    /// diagonal]
     #[arg(long, value_name = "LENGTH", value_parser = distance)]
     nearest: Option<f64>,
     /// Farthest distance, such as 2m [default: unlimited]
@@ -116,7 +117,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let reference = Reference::Target(target);
     ensure!(
         !reference.is_loose(),
-        "--target: the {} are loose boards; use the file of one of them",
+        "--target: the {} are independent boards; use the file of one of them",
         counted(target.panels.len(), "panel")
     );
     let sheet = args.sheet.read(&limits, &[target.identity()], std::slice::from_ref(&printing))?;
@@ -138,7 +139,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         counted(target.panels.len(), "panel")
     );
     let places = args.places()?;
-    interrupt::set_status("the files written last are complete");
+    interrupt::set_status("the most recently written files are complete");
     let session = Watch {
         guide: match size {
             Some(size) => Some(args.guide(target, size, &intrinsics)?),
@@ -169,8 +170,8 @@ impl Args {
         }
         match self.model {
             ModelChoice::Auto => bail!(
-                "--model: auto needs the finished set of images; take them with the richest model in question, such as \
-                 rational"
+                "--model: auto needs the complete set of images; use the candidate model with the most \
+                 parameters, such as rational, for the guide"
             ),
             ModelChoice::Model(Model::Spline { .. }) => bail!("--model: {NO_SPLINE}"),
             ModelChoice::Model(model) => Ok((model.into(), None)),
@@ -453,7 +454,7 @@ impl Watch<'_> {
             say!("done: calibrate with the photographs in {folder}");
             if count < FEW {
                 log!(
-                    "{views} are few: the uncertainty of {} px assumes that the model fits, which only more views can show",
+                    "{views} are too few to test the model: the uncertainty of {} px assumes that the model fits; take more views to verify this",
                     next.now_px.map_or(String::new(), |now| format!("{now:.4}"))
                 );
             }

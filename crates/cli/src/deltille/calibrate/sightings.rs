@@ -86,7 +86,7 @@ fn scale(text: &str) -> Result<[f64; 2], String> {
     match parts.as_slice() {
         [both] => Ok([number(both)?; 2]),
         [across, up] => Ok([number(across)?, number(up)?]),
-        _ => Err("expected one number, or two (across and up the sheet)".to_owned()),
+        _ => Err("expected one number, or two (horizontal and vertical)".to_owned()),
     }
 }
 
@@ -260,7 +260,7 @@ pub fn put_on(sheet: &Sheet, target: Option<&Target>, views: &mut [View]) -> any
 fn as_option_error(error: SheetUseError) -> anyhow::Error {
     match error {
         SheetUseError::Loose => anyhow!(
-            "--target: loose boards in one file have no known relative pose; make a file for each board"
+            "--target: independent boards in one file have no known relative pose; make a file for each board"
         ),
         _ => error.into(),
     }

@@ -30,8 +30,8 @@ use deltille_core::words::counted;
 /// Options of the solver and the report.
 #[derive(clap::Args)]
 pub struct SolveArgs {
-    /// Hold out every N-th view (N, 2N, …), or every N-th frame of a rig, and report its error with only poses
-    /// estimated
+    /// Hold out every N-th view (N, 2N, …), or every N-th frame of a rig, and report its
+    /// reprojection error, with only its poses estimated
     #[arg(long, value_name = "N", value_parser = whole(2..=u32::MAX))]
     holdout: Option<u32>,
     /// Robust loss for outliers
@@ -374,7 +374,7 @@ fn mapped(map: &TargetMap, views: usize) -> String {
         true => String::new(),
         false => {
             format!(
-                "; a corner is in {}, but {MIN_VIEWS_TO_MEASURE} or more are recommended",
+                "; the median corner was seen in {}, but {MIN_VIEWS_TO_MEASURE} or more are recommended",
                 counted(views, "view")
             )
         }

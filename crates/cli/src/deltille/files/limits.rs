@@ -9,7 +9,7 @@ const HEADING: &str = "Input limits";
 /// The limit of text files.
 #[derive(clap::Args)]
 pub struct FileLimits {
-    /// Largest file size in bytes, such as 500M [default: 200M]
+    /// Maximum file size in bytes, such as 500M [default: 200M]
     #[arg(long, help_heading = HEADING, value_name = "BYTES", value_parser = count)]
     max_bytes: Option<u64>,
 }
@@ -19,10 +19,12 @@ pub struct FileLimits {
 pub struct ImageLimits {
     #[command(flatten)]
     files: FileLimits,
-    /// Largest number of pixels of an image, and of all images in memory, such as 400M [default: 150M]
+    /// Maximum number of pixels per image, and of all images in memory together, such as 400M
+    /// [default: 150M]
     #[arg(long, help_heading = HEADING, value_name = "PIXELS", value_parser = count)]
     max_pixels: Option<u64>,
-    /// Largest number of pixels per byte of the file, for photographs of more than 10 megapixels [default: 100]
+    /// Maximum number of pixels per byte of the file, for photographs of more than 10 megapixels
+    /// [default: 100]
     #[arg(long, help_heading = HEADING, value_name = "PIXELS", value_parser = count)]
     max_pixels_per_byte: Option<u64>,
 }
@@ -32,10 +34,10 @@ pub struct ImageLimits {
 pub struct AllLimits {
     #[command(flatten)]
     images: ImageLimits,
-    /// Largest number of parts of a file: elements, operators, nodes, triangles [default: 4M]
+    /// Maximum number of parts of a file: elements, operators, nodes, triangles [default: 4M]
     #[arg(long, help_heading = HEADING, value_name = "PARTS", value_parser = count)]
     max_nodes: Option<u64>,
-    /// Largest nesting depth of parts [default: 64]
+    /// Maximum nesting depth of parts [default: 64]
     #[arg(long, help_heading = HEADING, value_name = "LEVELS", value_parser = whole(1..=u16::MAX))]
     max_depth: Option<u16>,
     /// Time limit in seconds for reading a file, and for drawing a page [default: 60]

@@ -252,7 +252,7 @@ fn textures_replaced(folder: &Path, staged: &Path, written: &[&str]) -> Option<S
     let left = own_left(folder, written, |name| is_texture(name) || is_mesh(name));
     (!left.is_empty()).then(|| {
         format!(
-            "{}: these use other textures than the ones just written; remove them, or write them again",
+            "{}: these files use textures other than those just written; remove them, or write them again",
             left.iter()
                 .map(|name| folder.join(name).display().to_string())
                 .collect::<Vec<_>>()

@@ -19,7 +19,7 @@ pub struct Args {
     /// Tags per row and number of rows, such as 6x6
     #[arg(long, value_name = "COLUMNSxROWS")]
     tags: Grid,
-    /// Side of a tag with its black border (Kalibr's tagSize), such as 25mm, 8.8cm, 1in
+    /// Side length of a tag including its black border (Kalibr's tagSize), such as 25mm, 8.8cm, 1in
     #[arg(long, value_name = "LENGTH", default_value = "25mm", value_parser = parse_length_mm)]
     edge: f64,
     /// Gap between tags as a fraction of the tag's side, 0.1 to 0.9 (Kalibr's tagSpacing)

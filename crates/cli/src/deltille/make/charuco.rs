@@ -18,7 +18,7 @@ pub struct Args {
     /// Edge length of a square, such as 30mm, 3cm, 1.2in
     #[arg(long, value_name = "LENGTH", default_value = "30mm", value_parser = parse_length_mm)]
     edge: f64,
-    /// Side of a marker with its black border [default: three quarters of the square]
+    /// Side length of a marker including its black border [default: three quarters of the square]
     #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm)]
     marker: Option<f64>,
     /// OpenCV dictionary: 4x4, 5x5, 6x6 or 7x7 with _50, _100, _250 or _1000; apriltag_16h5, apriltag_25h9 or

@@ -14,7 +14,8 @@ pub struct Args {
     /// Shift every second row (OpenCV's CALIB_CB_ASYMMETRIC_GRID)
     #[arg(long)]
     asymmetric: bool,
-    /// Distance between rows. Circles in a row have the same distance, or twice this in an asymmetric grid
+    /// Distance between rows. The spacing of circles in a row is the same, or twice this in an
+    /// asymmetric grid
     #[arg(long, value_name = "LENGTH", default_value = "20mm", value_parser = parse_length_mm)]
     spacing: f64,
     /// Diameter of a circle [default: half the spacing]

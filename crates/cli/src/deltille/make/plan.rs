@@ -33,7 +33,7 @@ pub struct Args {
     /// Range of distances from the camera to the board, such as 50cm..3m
     #[arg(long, value_name = "NEAR..FAR", value_parser = range)]
     distance: [f64; 2],
-    /// Largest tilt at which all tags must be readable from the farthest distance, °
+    /// Maximum tilt at which all tags must be readable at the farthest distance, °
     #[arg(long, value_name = "DEGREES", default_value = "45", value_parser = number(0.0..=75.0))]
     tilt: f64,
     /// Propose a checkerboard
@@ -42,8 +42,8 @@ pub struct Args {
     /// Tag family; checkerboards have no tags unless it is given [default: delTag25h7]
     #[arg(long)]
     family: Option<String>,
-    /// Propose a board of position codes, on which any 3 × 4 adjacent tiles identify their position and which of 255
-    /// boards it is
+    /// Propose a board of position codes, on which any 3 × 4 adjacent tiles identify the board (one
+    /// of 255) and their position on it
     #[arg(long, conflicts_with_all = ["family", "checker"])]
     dense: bool,
     /// Propose a board without tags
@@ -178,12 +178,12 @@ fn print(situation: &Situation, proposal: &Proposal, command: &str) -> anyhow::R
     );
     say!("{command}");
     let whole = match proposal.reach.tags {
-        0 => "; nearer, it is not labelled",
-        _ if is_dense(proposal) => "; nearer, any 3 × 4 tiles are labelled",
-        _ => "; nearer, visible parts with a tag are labelled",
+        0 => "; closer, it is not labelled",
+        _ if is_dense(proposal) => "; closer, any 3 × 4 visible tiles are labelled",
+        _ => "; closer, visible parts with a tag are labelled",
     };
     say!(
-        "{}, {}; fully in the image from {} on{whole}",
+        "{}, {}; fully in the image at {} or more{whole}",
         counted(proposal.reach.corners, "corner"),
         counted(proposal.reach.tags, "tag"),
         shown(proposal.whole_from_mm)

@@ -148,7 +148,7 @@ pub fn run_mesh(mesh: MeshArgs) -> anyhow::Result<ExitCode> {
         );
     }
     if inside_out {
-        say!("{}: the faces point inwards; they were flipped", path.display());
+        say!("{}: the face normals pointed inwards and were flipped", path.display());
     }
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let name = settings.name.clone().unwrap_or_else(|| Name::like(&stem).to_string());

@@ -35,7 +35,8 @@ struct DetectArgs {
     images: Vec<PathBuf>,
     #[command(flatten)]
     finder: FinderArgs,
-    /// Number of detections per image; the fastest counts, because other processes slow the rest
+    /// Number of runs per image; the fastest is reported, because other processes slow down the
+    /// others
     #[arg(long, value_name = "N", default_value_t = 5,
           value_parser = whole(1..=1000u32))]
     repeat: u32,

@@ -141,7 +141,8 @@ struct PhotographsArgs {
     #[arg(long, value_name = "KIND", value_delimiter = ',', default_value = "deltille",
           value_parser = ["deltille", "deltille-untagged", "checker", "checker-untagged", "all"])]
     kind: Vec<String>,
-    /// Photograph the first page of this target instead: the .json of `deltille board` …
+    /// Simulate photographs of the first page of this target instead: the .json of `deltille board`
+    /// …
     #[arg(long, value_name = "FILE", conflicts_with = "kind")]
     target: Option<PathBuf>,
     /// Family file, if the target uses a family that does not ship with the program

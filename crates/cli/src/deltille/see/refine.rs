@@ -35,8 +35,8 @@ pub struct Args {
     /// Refinement method
     #[arg(long, default_value = "model")]
     method: Method,
-    /// Side of the square window of pixels that may be read (odd); the polynomial method uses the largest radius r with
-    /// 4r + 1 ≤ window
+    /// Side length of the square pixel window (odd); the polynomial method uses the largest radius
+    /// r with 4r + 1 ≤ window
     #[arg(long, value_name = "PIXELS", default_value_t = 21, value_parser = window)]
     window: usize,
     /// Tone curve of the camera: linear, srgb, a gamma such as 2.2, or auto (estimated from all these corners)

@@ -81,7 +81,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     target_file::set_family(&mut target, args.family.as_deref())?;
     if !target.is_one_scene() {
         bail!(
-            "{} has several loose boards; only solids and single boards can be rendered",
+            "{} has several independent boards; only solids and single boards can be rendered",
             target.name
         );
     }

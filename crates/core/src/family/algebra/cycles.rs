@@ -62,7 +62,7 @@ impl CycleSpace {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Arrangement {
-    /// For each cycle of the code, the index of its cycle of the tag.
+    /// For each cycle of the code, the index of the tag cycle that carries it.
     pub places: Vec<u8>,
     /// For each cycle of the code, the number of steps, 0 to 2, by which it is rotated.
     pub starts: Vec<u8>,
@@ -72,7 +72,8 @@ pub struct Arrangement {
 }
 
 impl Arrangement {
-    /// Returns the identity: every cycle of the code is on the tag's cycle of the same number, none is inverted.
+    /// Returns the identity: every cycle of the code is on the tag's cycle with the same number,
+    /// and none is inverted.
     pub fn plain(space: CycleSpace) -> Self {
         let n = space.cycles as usize;
         Self { places: (0..n as u8).collect(), starts: vec![0; n], inverted: 0 }

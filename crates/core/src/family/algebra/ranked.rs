@@ -2,8 +2,9 @@
 //!
 //! The rotation σ splits such a code into the words F that it fixes and the words E with w + σw + σ²w = 0. On E, the
 //! rotation is multiplication by a primitive third root of unity, so E is a vector space over GF(4). Words w + f and
-//! w′ + f′ (w, w′ in E; f, f′ in F) are rotations of each other exactly if f = f′ and w, w′ are rotations of each
-//! other, that is, span the same line over GF(4). So the orbits of three words are the pairs of a word of F and a
+//! w′ + f′ (w, w′ in E; f, f′ in F) are rotations of each other if and only if f = f′ and w, w′ are
+//! rotations of each other. The latter holds if w and w′ span the same line over GF(4). So the
+//! orbits of three words are the pairs of a word of F and a
 //! point of the projective space of E: |F| · (|E|−1)/3 of them.
 
 use super::{CycleSpace, Span};

@@ -19,9 +19,10 @@ use crate::lattice::Dimension;
 /// union uses the central cell, it is black, or white if only that satisfies the rules. Codes are sorted by the
 /// smallest of the three rotated words.
 ///
-/// A linear code may have far more words than anybody lists. With a [`stride`](Self::stride), codes are those of the
-/// tags number 0, stride, 2·stride, … ([`Self::by_rank`]), in this order, that the rules admit. So they are
-/// distributed over the whole code; the first ones in order would all start with black cells.
+/// A linear code may have far more words than can be listed. With a [`stride`](Self::stride), the
+/// codes are the tags 0, stride, 2·stride, … ([`Self::by_rank`]) that the rules admit, in this
+/// order. So they are distributed over the whole code. The first tags in order would all start with
+/// black cells.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AlgebraicConstruction {
@@ -86,7 +87,8 @@ impl AlgebraicConstruction {
 
     /// Lists the codes of a construction with a stride.
     fn strided(&self, screen: &Screen, stride: u64) -> Result<Vec<u64>, FamilyError> {
-        /// Maximum number of codes: for 64 bits, they take a gigabyte of memory and two of a file.
+        /// Maximum number of codes: with 64 bits, they take one gigabyte of memory and a file of
+        /// two gigabytes.
         const MAX_CODES: u64 = 1 << 27;
         /// Number of tags tried for each code.
         const TRIED: u64 = 64;
@@ -103,7 +105,7 @@ impl AlgebraicConstruction {
         if screen.is_robust() && !self.is_apart(screen, &self.union(dimension)?) {
             return Err(wrong(
                 "stride",
-                "words of the linear code are too close with hidden cells",
+                "with cells hidden, the distance between words of the linear code is too small",
             ));
         }
         let count = ranked.len();
@@ -127,7 +129,8 @@ impl AlgebraicConstruction {
         Ok(codes.take(limit as usize).collect())
     }
 
-    /// Returns the words of the union on the tag that the screen admits one by one, and the exchanged ones.
+    /// Returns the words of the union on the tag that the screen admits individually, and the
+    /// exchanged words.
     ///
     /// # Errors
     /// Returns an error if the record is invalid, see [`Self::codes`].
@@ -140,7 +143,7 @@ impl AlgebraicConstruction {
         Ok(words)
     }
 
-    /// Returns whether any two words of the union, arranged on the tag, are far enough apart.
+    /// Returns whether all pairs of words of the union, arranged on the tag, are far enough apart.
     fn is_apart(&self, screen: &Screen, union: &CosetUnion) -> bool {
         let dimension = screen.words().dimension();
         let zero = self.arrangement.apply(dimension, &[0])[0];
@@ -197,8 +200,9 @@ impl AlgebraicConstruction {
         Ok(centre_of(&union, &self.arrangement, dimension))
     }
 
-    /// Returns the linear code and one word of each of its cosets as words of the tag, and a mask of the central cell
-    /// if no word uses it, else 0. Returns `None` if the family has exchanged words, or the record is inconsistent.
+    /// Returns the linear code and one word of each of its cosets, as words of the tag. The last
+    /// value is a mask of the central cell if no word uses it, else 0. Returns `None` if the family
+    /// has exchanged words, or the record is inconsistent.
     pub fn on_the_tag(&self, dimension: Dimension) -> Option<(Span, Vec<u64>, u64)> {
         let space = CycleSpace::of(dimension);
         if !self.exchanged.is_empty() || !self.arrangement.fits(space) {
@@ -241,16 +245,22 @@ impl AlgebraicConstruction {
             return Err("the linear code is not invariant under rotation of the tag".to_owned());
         }
         let weights = weights(&code, space.bits());
-        let weights = weights.ok_or("the linear code and its dual have too many words to weigh")?;
+        let weights = weights
+            .ok_or("the linear code and its dual have too many words to compute all weights")?;
         if (1..screen.distance()).any(|weight| weights[weight as usize] > 0) {
-            return Err("the linear code has a word lighter than the distance".to_owned());
+            return Err(
+                "the linear code has a word whose weight is less than the distance".to_owned()
+            );
         }
         if screen.is_robust() && code.dimension() > MAX_DIMENSIONS {
             return Err("the linear code has too many words to check with hidden cells".to_owned());
         }
         let union = CosetUnion { space, code, cosets };
         if screen.is_robust() && !self.is_apart(screen, &union) {
-            return Err("words of the linear code are too close with hidden cells".to_owned());
+            return Err(
+                "with cells hidden, the distance between words of the linear code is too small"
+                    .to_owned(),
+            );
         }
         // A free centre is not part of the linear code: it can only add distance.
         let ignored = if has_free_centre(&union) { 1u64 << (space.bits() - 1) } else { 0 };
@@ -309,7 +319,8 @@ pub fn arranged(screen: &Screen, union: &CosetUnion, arrangement: &Arrangement) 
     words.into_par_iter().filter_map(|word| choice(screen, word, centre)).collect()
 }
 
-/// Returns a word as a code, if it may be one. A free central cell is black, or white if only that satisfies the
+/// Returns the code of a word that the screen admits. A free central cell is black, or white if
+/// only that satisfies the
 /// rules.
 fn choice(screen: &Screen, word: u64, free_centre: u64) -> Option<u64> {
     match free_centre {

@@ -74,7 +74,7 @@ impl Span {
 
     /// Returns the subcode of words that are zero at every bit set in `mask`.
     pub fn vanishing_on(&self, mask: u64) -> Self {
-        // Reduced with the masked bits leading: the remaining rows have none of them.
+        // Elimination on the masked bits: the remaining rows are zero there.
         let mut rows = self.rows.clone();
         let mut kept = Vec::new();
         while let Some(row) = rows.pop() {

@@ -1,7 +1,8 @@
 //! The weight distribution of a linear code: a proof of its distance.
 //!
-//! For a code of few dimensions, all words are weighed. For one of many, all words of its dual are, which share an
-//! even number of set bits with each code word. The number B_j of dual words of weight j determines the number A_i of
+//! If a code has few dimensions, all its words are weighed. If it has many, all words of its dual
+//! are weighed. They share an even number of set bits with each code word. The number B_j of dual
+//! words of weight j determines the number A_i of
 //! code words of weight i (MacWilliams & Sloane, chapter 5):
 //!
 //! ```text
@@ -14,7 +15,7 @@ use super::Span;
 use crate::family::kernels::count_distances;
 use crate::family::krawtchouk::krawtchouk;
 
-/// Largest number of dimensions of a weighed code or dual: a second or two.
+/// Largest number of dimensions of a weighed code or dual: weighing takes a second or two.
 const MAX_DIMENSIONS: u32 = 30;
 
 /// Returns the number of words of each weight, 0 to `length`; `None` if neither the code nor its dual is small
@@ -66,7 +67,7 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// Tests counting by the words or those of the dual, with and without a list.
+        /// Tests counting with the words of the code or of its dual, with and without a list.
         #[test]
         fn weights_are_those_of_all_words(words: [u64; 17], length in 9u32..=20, few in 1usize..17) {
             let mask = (1 << length) - 1;

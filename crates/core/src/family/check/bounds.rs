@@ -62,7 +62,8 @@ pub fn bounds_of_cells(kind: GridKind, b: u32, distance: u32) -> Bounds {
         u64::MAX if distance > 1 => delsarte(b, (distance - 1..=b).collect()),
         best => best,
     };
-    // The number of all words, or one less if it exceeds a machine word; at distance 1 they are a code.
+    // The number of all words, or one less if it exceeds a machine word. At distance 1, all words
+    // form a code.
     let all = 1u64.checked_shl(b).unwrap_or(u64::MAX);
     Bounds {
         linear_programming: best.min(all) / rotations,

@@ -23,13 +23,14 @@ pub struct Certificate {
     pub robust: Vec<Robust>,
     /// Two codes (or one, twice) at the minimum distance, if it is too small; else zeros.
     pub closest: [u32; 2],
-    /// Whether all pairs were compared; if not, a sample was, and the structure was proven.
+    /// Whether all pairs were compared. Otherwise a sample was compared, and the distance was
+    /// proven from the structure.
     pub all_compared: bool,
     /// Ids of codes that break a rule of the family.
     pub rule_breakers: Vec<u32>,
     /// Number of pairs, among the compared codes and their rotations, at each distance.
     pub histogram: BTreeMap<u32, u64>,
-    /// The part of the construction that was not repeated, in words; empty if all of it was.
+    /// Description of the part of the construction that was not repeated; empty if all of it was.
     pub unchecked: String,
     /// Wrong claims of the file; empty if the family is correct.
     pub failures: Vec<String>,
@@ -84,13 +85,13 @@ pub fn certify(family: &Family) -> Certificate {
             }
         },
         Construction::Search { .. } => {
-            certificate.unchecked = "that the search finds these codes again".to_owned();
+            certificate.unchecked = "whether the search reproduces these codes".to_owned();
             return certificate;
         }
         // Single tags have almost no distance; patches do: `places::distances`.
         Construction::Positions => return certificate,
         Construction::Imported { .. } => {
-            certificate.unchecked = "where the codes come from".to_owned();
+            certificate.unchecked = "the origin of the codes".to_owned();
             return certificate;
         }
     };
@@ -111,7 +112,7 @@ pub fn certify(family: &Family) -> Certificate {
             if !same {
                 certificate
                     .failures
-                    .push("construction: it gives other codes than the file".to_owned());
+                    .push("construction: it yields other codes than those in the file".to_owned());
             }
         }
     }
@@ -124,7 +125,7 @@ fn sorted(codes: &[u64]) -> Vec<u64> {
     codes
 }
 
-/// Largest number of bits at which lexicodes are rebuilt completely: seconds.
+/// Largest number of bits at which lexicodes are rebuilt completely: this takes seconds.
 const REBUILT_BITS: u32 = 25;
 
 /// Number of first candidates of a larger lexicode that are tried again.
@@ -133,7 +134,8 @@ const PREFIX: u64 = 1 << 22;
 /// Checks the codes of a family: distance, rules and histogram; takes a second for 100,000 codes.
 ///
 /// Rotations come from [`TagCells::rotate`] and complexity from its list of neighbours, not from the tables that the
-/// searches use. Up to 100,000 codes, all pairs are compared. Beyond, the distance is proven from the structure that
+/// searches use. Up to 100,000 codes, all pairs are compared. Beyond that, the distance is proven
+/// from the structure that
 /// the file records ([`crate::family::algebra::AlgebraicConstruction::prove`]), and a sample of pairs is compared
 /// too.
 pub fn certify_codes(family: &Family) -> Certificate {

@@ -11,8 +11,8 @@
 //! natural words within t cells of a code to 10 %, and for other photographs within a factor of 3
 //! ([`NATURAL_FACTOR`]; `docs/families.md`, “False positives”).
 //!
-//! Limits: triangular tags only. Textures have higher rates than the mean, grass 2.4 times as high; other tags are
-//! not natural images.
+//! Limits: triangular tags only. Textures have higher rates than the mean, grass 2.4 times as high.
+//! Tags of other families are not natural images.
 
 use std::collections::BTreeMap;
 
@@ -71,7 +71,7 @@ impl NaturalWords {
         Self { words: TagWords::new(dimension), chances, free: 0 }
     }
 
-    /// Declares cells with arbitrary content; words have them black.
+    /// Declares cells with arbitrary content; they are black in every word.
     #[must_use]
     pub fn with_free(self, free: u64) -> Self {
         Self { free, ..self }
@@ -83,13 +83,13 @@ impl NaturalWords {
         shown.map(|pairs| self.chances[pairs as usize]).sum()
     }
 
-    /// Returns the probability that it contains a word within `errors` cells of a code in one of its rotations;
-    /// enumerates all such words.
+    /// Returns the probability that a bordered triangle contains a word within `errors` cells of a
+    /// code in one of its rotations. Enumerates all these words.
     pub fn probability_near(&self, code: u64, errors: u32) -> f64 {
         (0..=errors).map(|radius| self.sphere(code, radius)).sum()
     }
 
-    /// Returns the same for the words that differ in `radius` cells.
+    /// Returns the probability of the words that differ from a code in exactly `radius` cells.
     fn sphere(&self, code: u64, radius: u32) -> f64 {
         let bits = self.words.dimension().bits();
         let used = subsets(bits, radius).filter(|flips| flips & self.free == 0);
@@ -100,8 +100,9 @@ impl NaturalWords {
     /// white and black cells. This is the log-likelihood of the measurement in natural images, up to the same factor
     /// that Σ l s has for a code. `half_odds` are by bit.
     ///
-    /// The sums proceed cell by cell from the base to the apex. They are kept by the number of differing pairs so
-    /// far, and by the colours of cells with a later neighbour: inverted ones below, and the one to the left.
+    /// The sums proceed cell by cell from the base to the apex. They are grouped by the number of
+    /// differing pairs so far, and by the colours of cells with a later neighbour: inverted ones
+    /// below, and the one to the left.
     pub fn log_likelihood(&self, half_odds: &[f32]) -> f64 {
         let rows = self.words.dimension().rows();
         let (counts, states) = (self.chances.len(), 1usize << rows);
@@ -170,7 +171,8 @@ impl NaturalWords {
 impl Family {
     /// Returns the probability that a bordered triangle in a natural image is mistaken for a tag, for 0, 1, …,
     /// [`Self::correctable`] corrected bits. Returns `None` for square tags and position codes. In contrast,
-    /// [`Self::false_positive_rates`] assumes fair coin tosses. Above some 100,000 words, the words near the codes
+    /// [`Self::false_positive_rates`] assumes fair coin tosses. Above about 100,000 words, the
+    /// words near the codes
     /// are sampled, always in the same way; the rates are then accurate to 10 %.
     pub fn natural_false_positive_rates(&self) -> Option<Vec<f64>> {
         if self.kind() != GridKind::Deltille || self.is_position_family() {
@@ -227,7 +229,7 @@ fn subsets(bits: u32, ones: u32) -> impl Iterator<Item = u64> {
     std::iter::successors((first <= all).then_some(first), next)
 }
 
-/// Draws one of them at random, from cells that are not free.
+/// Draws a random word of `bits` bits with `ones` set, all in cells that are not free.
 fn drawn_subset(bits: u32, free: u64, ones: u32, random: &mut ChaCha8Rng) -> u64 {
     let mut word = 0u64;
     while word.count_ones() < ones {

@@ -1,8 +1,9 @@
 //! The published construction: a lexicode over an arithmetic progression of candidates.
 //!
-//! Candidates v(i) = start + i·step mod 2^b are tried in order. A candidate is kept if it satisfies the [`Rules`], is
-//! at least h from its own rotations, and at least h from every rotation of every code kept before
-//! (`docs/families.md`, “The published construction”). This is the AprilTag construction (Olson, "AprilTag: A robust
+//! Candidates v(i) = start + i·step mod 2^b are tried in order. A candidate is kept if it satisfies
+//! the [`Rules`] and its distance is at least h from its own rotations and from every rotation of
+//! every code kept before (`docs/families.md`, “The published construction”). This is the AprilTag
+//! construction (Olson, "AprilTag: A robust
 //! and flexible visual fiducial system", ICRA 2011) with three rotations instead of four.
 //!
 //! Codes found early exclude nearly all of 2^36 candidates. So only the first 2^27 are tried in order. A sweep over
@@ -45,8 +46,8 @@ pub struct Lexicode {
 }
 
 impl Lexicode {
-    /// Returns the parameters of the published family of these bits and distance. If none was published, they are the
-    /// same with `start` = `step` mod 2^b.
+    /// Returns the parameters of the published family of these bits and distance. If none was
+    /// published, `start` is `step` mod 2^b, and the other parameters follow the same rules.
     pub fn published(dimension: Dimension, distance: u32) -> Self {
         let start = match (dimension.bits(), distance) {
             (16, 5) => 0x24d6,
@@ -66,7 +67,7 @@ impl Lexicode {
         }
     }
 
-    /// Sets other rules for single codes.
+    /// Sets the rules for single codes.
     #[must_use]
     pub fn rules(self, rules: Rules) -> Self {
         Self { rules, ..self }
@@ -250,7 +251,8 @@ const FIRST_CANDIDATES: u64 = 1 << 27;
 /// Largest distance at which the first codes leave too many words open to list them.
 const MIN_DISTANCE: u32 = 7;
 
-/// Number of candidates tried between two checkpoints: some seconds of work, and some kilobytes of file.
+/// Number of candidates tried between two checkpoints: a few seconds of work, and a few kilobytes
+/// in a file.
 const CHECKPOINT_CANDIDATES: u64 = 1 << 23;
 
 /// State of a long search, from which it can be resumed.

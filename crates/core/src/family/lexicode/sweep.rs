@@ -29,7 +29,8 @@ pub(super) struct Sweep<'a> {
 const PART_SYMBOLS: u32 = 3;
 
 impl<'a> Sweep<'a> {
-    /// Returns whether words of this many bits can be swept: whole symbols, and enough of them.
+    /// Returns whether words with this number of bits can be swept: they must consist of whole
+    /// symbols, and of enough of them.
     pub(super) fn suits(bits: u32) -> bool {
         bits.is_multiple_of(3) && bits / 3 > PART_SYMBOLS + LEAF_BITS / 3
     }

@@ -1,4 +1,4 @@
-//! Exact distances between the words of patches of tiles, over all places.
+//! Exact distances between the words of patches of tiles, over all positions.
 
 use std::collections::BTreeSet;
 
@@ -7,15 +7,16 @@ use rayon::prelude::*;
 use super::{BITS, DEGREE, MASK, POSITIONS, cells, id, state, times, unmasked};
 use crate::lattice::{Cell, GridKind, Vertex};
 
-/// Minimum number of cells in which a patch of tiles differs from other patches, at any place on any board.
+/// Minimum number of cells in which a patch of tiles differs from other patches, at any position on
+/// any board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub struct PositionDistances {
-    /// Distance from patches with the same rotation, at another place.
+    /// Distance from patches with the same rotation, at another position.
     pub places: u32,
-    /// Distance from patches with another rotation, at any place.
+    /// Distance from patches with another rotation, at any position.
     pub turned: u32,
-    /// Distance from mirrored patches, at any place and in any rotation.
+    /// Distance from mirrored patches, at any position and in any rotation.
     pub mirrored: u32,
 }
 
@@ -32,10 +33,11 @@ impl PositionDistances {
 pub struct PatchCertificate {
     /// Number of tiles of a patch.
     pub tiles: usize,
-    /// Number of forms checked: all connected ones with this number of tiles, or the parallelograms and zigzags of
+    /// Number of shapes checked: all connected ones with this number of tiles, or the
+    /// parallelograms and zigzags of
     /// three by four tiles.
     pub forms: usize,
-    /// Minimum over all forms.
+    /// Minimum over all shapes.
     pub least: PositionDistances,
     /// Claimed minimum distance of patches that are not mirrored, in any rotation.
     pub claimed: u32,
@@ -80,10 +82,11 @@ fn three_by_four() -> Vec<Vec<Vertex>> {
 /// Maximum number of tiles of a patch, whose cells are the bits of a word.
 const MAX_TILES: usize = (u128::BITS / BITS) as usize;
 
-/// Computes the number of cells in which a patch of up to 14 tiles differs from any other of the same form; `None`
-/// for more tiles.
+/// Computes the number of cells in which a patch of up to 14 tiles differs from any other of the
+/// same shape; `None` for more tiles.
 ///
-/// The result covers all pairs of places of all boards, by minimum weights of linear codes (Brouwer and Zimmermann).
+/// The result covers all pairs of positions on all boards, by minimum weights of linear codes
+/// (Brouwer and Zimmermann).
 pub fn distances(tiles: &[Vertex]) -> Option<PositionDistances> {
     let [seen, in_mirror] = [false, true].map(|mirrored| Seen::new(tiles, mirrored));
     if tiles.len() > MAX_TILES {
@@ -107,7 +110,7 @@ pub fn distances(tiles: &[Vertex]) -> Option<PositionDistances> {
     })
 }
 
-/// Words of patches of a form without their masks: words of a linear code.
+/// Words of patches of one shape without their masks: words of a linear code.
 struct Seen {
     /// Contribution of each bit of a state.
     generators: Vec<u128>,
@@ -151,8 +154,8 @@ impl Seen {
 /// Returns the minimum weight of the sums of `offset` and nonzero words of the generated code.
 ///
 /// Consider a systematic form on an information set, which has as many positions as the code has dimensions. A word
-/// that is the sum of t rows has weight t there. So once all sums of up to t rows were checked on several disjoint
-/// sets, any other word has at least t + 1 on each.
+/// that is the sum of t rows has weight t there. So after all sums of up to t rows are checked on
+/// several disjoint sets, any other word has weight t + 1 or more on each set.
 fn least_weight(generators: &[u128], offset: u128) -> u32 {
     let mut forms: Vec<(Vec<u128>, u128, usize)> = Vec::new();
     let mut used = 0;
@@ -180,8 +183,8 @@ fn least_weight(generators: &[u128], offset: u128) -> u32 {
     least
 }
 
-/// Returns a basis in which each row alone has its pivot, the offset without pivots, and the new pivots. Pivots lie
-/// outside of `used` where possible; only those are returned.
+/// Returns a basis in which each pivot occurs in one row only, the offset without pivots, and the
+/// new pivots. Pivots lie outside `used` where possible; only pivots outside `used` are returned.
 fn systematic(generators: &[u128], mut offset: u128, used: u128) -> (Vec<u128>, u128, u128) {
     let mut rows = generators.to_vec();
     let (mut rank, mut fresh) = (0, 0);
@@ -308,8 +311,8 @@ mod tests {
     fn rotated_lattices_give_words_of_the_same_code() {
         let patch = rhombus(3, 4);
         let cells = cells();
-        // A rotation by 120° maps the tile at (row, col) to that at (col, −row − col − 1). It is one further left
-        // because its lower left vertex is another one.
+        // A rotation by 120° maps the tile at (row, col) to that at (col, −row − col − 1). It is
+        // one column further left because a different vertex becomes its lower left one.
         let turned: Vec<Vertex> =
             patch.iter().map(|tile| Vertex::new(tile.col, -tile.row - tile.col - 1)).collect();
         let shown = patch.iter().zip(&turned).map(|(&from, &to)| {

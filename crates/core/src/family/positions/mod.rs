@@ -13,18 +13,23 @@
 //! subfield of q elements, and Tr is the trace to GF(2). Neighbouring tiles have the states s φ(z′ − z). So:
 //!
 //! - The word of any patch of tiles is a word of one linear code, up to the mask m; its 24 information bits are the
-//!   state of one of its tiles. Two places differ by another word of that code, so the minimum weight is their
+//!   state of one of its tiles. Two positions differ by another word of that code, so the minimum
+//!   weight is their
 //!   minimum distance.
 //! - If δ of a cell equals σ(δ) of the cell that a rotation moves there, the patch on a rotated board gives a word of
 //!   the same code, with the mask rotated. The weights of three cosets distinguish the rotations.
-//! - A mirrored patch gives a word of another such code. Its distance is again a minimum weight, in the sum of both
+//! - A mirrored patch gives a word of another code of this kind. Its distance is again a minimum
+//!   weight, in the sum of both
 //!   codes.
-//! - The 2²⁴ − 1 states are the places of q − 1 = 255 boards; each board repeats after √N = 256.5 edges.
+//! - The 2²⁴ − 1 states are the positions on q − 1 = 255 boards; each board repeats after √N =
+//!   256.5 edges.
 //!
-//! This is the geometry of the projective plane over GF(q), whose points are the N places of a board (Singer 1938).
-//! Codes of windows in periodic arrays are those of MacWilliams and Sloane (1976), here on the hexagonal lattice and
-//! with its rotations. δ and m were chosen at random, as the best of thousands by [`distances`]: their minimum
-//! distance over all places and rotations is the largest found.
+//! This is the geometry of the projective plane over GF(q), whose points are the N positions on a
+//! board (Singer 1938).
+//! MacWilliams and Sloane (1976) describe codes of windows in periodic arrays. Here they are
+//! applied to the hexagonal lattice with its rotations. δ and m are the best of thousands of random
+//! choices, compared by [`distances`]: their minimum distance over all positions and rotations is
+//! the largest found.
 
 mod distances;
 
@@ -48,7 +53,7 @@ const POLYNOMIAL: u32 = 0x100_0087;
 /// Number of elements of the subfield, q.
 const SUBFIELD: u32 = 1 << (DEGREE / 3);
 
-/// Number of places on a board, q² + q + 1.
+/// Number of positions on a board, q² + q + 1.
 pub const POSITIONS: u32 = SUBFIELD * SUBFIELD + SUBFIELD + 1;
 
 /// Number of boards, q − 1; board ids are smaller.
@@ -146,7 +151,8 @@ pub fn id(board: u32, tile: Vertex) -> u32 {
     board * POSITIONS + along.rem_euclid(POSITIONS.into()) as u32
 }
 
-/// Returns whether all places are different on a board with these numbers of rows and columns of tiles. Every second
+/// Returns whether all positions are distinct on a board with these numbers of rows and columns of
+/// tiles. Every second
 /// row is shifted by half an edge.
 pub fn are_different(rows: u32, cols: u32) -> bool {
     let (rows, cols, places) = (i64::from(rows), i64::from(cols), i64::from(POSITIONS));

@@ -52,7 +52,8 @@ pub fn dictionary_names() -> impl Iterator<Item = &'static str> {
     DICTIONARIES.iter().map(|dictionary| dictionary.name)
 }
 
-/// Finds a dictionary by name, in any case, with or without `DICT_`. Returns its name in OpenCV and the dimension of
+/// Finds a dictionary by name, ignoring case, with or without `DICT_`. Returns its name in OpenCV
+/// and the dimension of
 /// its markers.
 pub fn dictionary(name: &str) -> Option<(&'static str, Dimension)> {
     let found = find(name)?;

@@ -18,9 +18,10 @@ pub enum ExportFormat {
     Json,
     /// One hexadecimal word per line.
     Text,
-    /// YAML for `cv::FileStorage`: name, bits, distance, size, fingerprint and the codes as hexadecimal texts. It is
-    /// not an ArUco dictionary: those contain squares with rotations by 90°. OpenCV's detector would neither find
-    /// triangular tags nor keep their distance.
+    /// YAML for `cv::FileStorage`: name, bits, distance, size, fingerprint and the codes as
+    /// hexadecimal strings. It is
+    /// not an ArUco dictionary: those contain squares with rotations by 90°. OpenCV's detector
+    /// would not find triangular tags, and ArUco would not preserve their distance.
     OpenCv,
 }
 

@@ -18,8 +18,9 @@ use crate::lattice::{Dimension, GridKind};
 #[serde(tag = "method", rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum Construction {
-    /// Candidates `start`, `start + step`, … modulo 2^bits are tried in order. Each is kept that satisfies the rules
-    /// and is far enough from all kept before (`docs/families.md`, “The published construction”).
+    /// Candidates `start`, `start + step`, … modulo 2^bits are tried in order. A candidate is kept
+    /// if it satisfies the rules and is far enough from all those kept before (`docs/families.md`,
+    /// “The published construction”).
     Lexicode {
         /// First candidate, hexadecimal.
         start: String,
@@ -31,7 +32,8 @@ pub enum Construction {
     /// A union of cosets of a linear code, arranged on the tag, with some codes exchanged
     /// ([`crate::family::algebra`]).
     Algebraic(AlgebraicConstruction),
-    /// Local search without initial codes (`deltille_search::Search`); the same numbers give the same codes.
+    /// Local search without initial codes (`deltille_search::Search`); the same seed, rounds and
+    /// steps give the same codes.
     Search {
         /// Seed of the random choices.
         seed: u64,
@@ -67,7 +69,7 @@ struct FamilyFile {
     rules: Rules,
     /// Number of pairs among the codes and their rotations at each distance.
     distance_histogram: BTreeMap<u32, u64>,
-    /// Index = number of corrected bits.
+    /// The index is the number of corrected bits.
     false_positive_rate: Vec<f64>,
     codes: Vec<String>,
 }

@@ -1,8 +1,10 @@
 //! Import of families from tables of other programs: C, Rust or Python source, or one code per line.
 //!
-//! Codes are the hexadecimal words of the text, in their order; without any, its lines that consist of hexadecimal
-//! digits. Bits are read row by row from the upper left, or from the apex for triangles, the first one being the most
-//! significant. A table of AprilTag 3 states by `bit_x` and `bit_y` where its bits are, and is put in that order.
+//! Codes are the hexadecimal words of the text, in order. If there are none, codes are the lines
+//! that consist of hexadecimal digits. Bits are read row by row from the upper left, or from the
+//! apex for triangles, the first one being the most
+//! significant. A table of AprilTag 3 states the positions of its bits in `bit_x` and `bit_y`; its
+//! bits are reordered by them.
 //!
 //! Limits: other orders of bits are not supported. AprilTags whose bits do not fill a square, for example those of
 //! tagStandard41h12, are rejected.
@@ -77,7 +79,7 @@ pub enum ImportError {
     Family(#[from] FamilyError),
 }
 
-/// Makes a family from the table in a text, and computes its distance by comparing all codes.
+/// Makes a family from the table in a string, and computes its distance by comparing all codes.
 ///
 /// # Errors
 /// Returns an error if there is no table, a property of it is unknown, or its codes do not form a family.
@@ -142,7 +144,7 @@ pub fn import(text: &str, spec: &ImportSpec) -> Result<Family, ImportError> {
     Ok(Family::of(&spec.name, kind, dimension, distance, codes, Rules::NONE, construction)?)
 }
 
-/// Removes the comments of C, Rust and Python from a text.
+/// Removes the comments of C, Rust and Python from source text.
 fn without_comments(text: &str) -> String {
     let mut left = String::with_capacity(text.len());
     let mut rest = text;
@@ -158,7 +160,7 @@ fn without_comments(text: &str) -> String {
     left + rest
 }
 
-/// Splits a text into names, numbers and other single characters; drops blanks.
+/// Splits a text into names, numbers and other single characters; drops whitespace.
 fn tokens(text: &str) -> Vec<&str> {
     let mut tokens = Vec::new();
     let mut rest = text;

@@ -81,8 +81,8 @@ pub fn square_names() -> Vec<&'static str> {
 }
 
 /// Returns the best shipped family for tiles of `kind` that has at least `needed` codes and corrects at least
-/// `corrects` cells. The best one to print has the fewest bits, which makes the largest cells, then the greatest
-/// distance.
+/// `corrects` cells. The best family for printing has the fewest bits, so that its cells are
+/// largest. Among equals, it has the greatest distance.
 pub fn smallest_shipped(
     kind: GridKind,
     needed: u64,

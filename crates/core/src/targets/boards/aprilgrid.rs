@@ -1,7 +1,7 @@
 //! AprilGrids as defined and numbered by Kalibr: tags in rows, with small black squares between their corners.
 //!
 //! ```text
-//!     ▪   ▪   ▪      The lattice is that of a checkerboard of which every second row and column is a gap, so
+//!     ▪   ▪   ▪      The lattice is that of a checkerboard in which every second row and column is a gap, so
 //!       2   3        that each corner of a tag is a corner of four tiles: its own, a small square, and two white
 //!     ▪   ▪   ▪      ones. Tags and corners are numbered row by row from the lower left; the frame is that of
 //!       0   1        Kalibr: its origin is the lower left corner of tag 0, x runs right, y up.
@@ -83,7 +83,7 @@ impl AprilGridSpec {
             format!("tagCols: {columns}"),
             format!("tagRows: {rows}"),
             format!("tagSize: {:?}  # m", tag_mm / 1000.0),
-            format!("tagSpacing: {gap:?}  # width of the gaps, in tags"),
+            format!("tagSpacing: {gap:?}  # gap between tags / tagSize"),
             format!("codeOffset: {first_id}"),
         ];
         Some(lines.map(|line| line + "\n").concat())

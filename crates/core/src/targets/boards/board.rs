@@ -58,8 +58,9 @@ pub fn size_mm(spec: &BoardSpec) -> DVec2 {
 
 /// Returns the tiles that carry tags, ordered by row, then column.
 ///
-/// Reading a tag needs the corners of its tile, so these are corners of the board, in every `spacing`-th row and
-/// column. On a checkerboard, the squares must also have the right colour. Of the possible starts, the one with the
+/// Reading a tag requires the corners of its tile, so these are corners of the board. Tagged tiles
+/// are in every `spacing`-th row and column. On a checkerboard, the squares must also have the
+/// right colour. Of the possible starts, the one with the
 /// most tags is used; among equal ones, the one whose tags are most evenly distributed around the centre of the
 /// board.
 pub fn tagged_tiles(
@@ -164,7 +165,8 @@ pub fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
     panels
 }
 
-/// Returns the pose of the rear panel: rotated about the vertical axis at half of `across`, at a depth.
+/// Returns the pose of the rear panel: rotated about the vertical axis at half of `across`, and
+/// moved back by the thickness.
 fn behind(across: f64, thickness_mm: f64) -> PanelPose {
     let turn = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, -1.0));
     PanelPose::new(turn, DVec3::new(across, 0.0, -thickness_mm))

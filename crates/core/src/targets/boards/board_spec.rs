@@ -116,8 +116,8 @@ impl BoardSpec {
             }
             Some(_) if self.tags.as_ref().is_some_and(|tags| tags.hole_mm.is_some()) => {
                 refused(format!(
-                    "a hole through a tag of one side would cut into a tile of the other: leave out {TagHoleMm}, or \
-             make one side",
+                    "a hole through a tag of one side would cut into a tile of the other: omit {TagHoleMm}, or \
+             make a one-sided board",
                 ))
             }
             Some(_) => Ok(()),

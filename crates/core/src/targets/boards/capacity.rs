@@ -37,7 +37,7 @@ impl TagSettings {
     }
 }
 
-/// Checks that a family has `count` codes from the first id on; `instead` names other remedies.
+/// Checks that a family has `count` codes starting at the first id; `instead` names other remedies.
 pub(in crate::targets) fn check_ids(
     settings: TagSettings,
     first: u32,
@@ -59,8 +59,9 @@ pub(in crate::targets) fn check_ids(
     })
 }
 
-/// Checks that the family exists, fits tiles of this kind, and has `needed` codes from the first id on. `instead`
-/// lists remedies other than ids and family, given the number of codes from the first id on.
+/// Checks that the family exists, fits tiles of this kind, and has `needed` codes starting at the
+/// first id. `instead` lists remedies other than ids and family, given the number of codes starting
+/// at the first id.
 pub(in crate::targets) fn check_family(
     kind: GridKind,
     tags: &TagSpec,

@@ -4,7 +4,7 @@
 //!       x →
 //!     ┌──────────────►     The target frame is that of OpenCV's object points: its origin is the upper left
 //!   y │ ■ 0 ■ 1 ■          corner of the board, x runs right, y down, z into the board. Markers are numbered
-//!   ↓ │ 2 ■ 3 ■ 4          row by row from the upper left, and so are corners, those between four squares.
+//!   ↓ │ 2 ■ 3 ■ 4          row by row from the upper left, like the corners, which lie between four squares.
 //!     ▼ ■ 5 ■ 6 ■          The panel frame is that of every checkerboard: y up, z towards the viewer.
 //! ```
 //!
@@ -32,8 +32,8 @@ const SIDES: std::ops::RangeInclusive<u32> = 3..=200;
 /// Range of a square's edge, mm.
 const SQUARE_MM: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
 
-/// Range of a marker's side, in squares. OpenCV finds markers up to the largest reliably; smaller ones waste the
-/// square.
+/// Range of a marker's side, in squares. OpenCV finds markers reliably up to the maximum; markers
+/// below the minimum waste the square.
 const MARKER_SQUARES: std::ops::RangeInclusive<f64> = 0.3..=0.9;
 
 /// Border of a marker, bit-widths: OpenCV's default, which everybody uses.

@@ -22,7 +22,7 @@ pub(super) const MIN_DENSE_TILES: u32 = 12;
 const MIN_SQUARE_BORDER_BITS: f64 = 1.0;
 
 /// Range of a tag's border, bit-widths. The border separates the code from the white around the tile. With half a bit
-/// the detector misses some corners of a clean print; from 0.6 bits on it finds all.
+/// the detector misses some corners of a clean print; with 0.6 bits or more it finds all.
 pub const BORDER_BITS: std::ops::RangeInclusive<f64> = 0.6..=10.0;
 
 /// The tags of a board and their positions.
@@ -68,8 +68,8 @@ impl Default for TagSpec {
 }
 
 impl TagSpec {
-    /// Returns a position code in every tile of a deltille grid, with the usual border. From 2 px per cell on, corners
-    /// are as precise as without codes.
+    /// Returns a position code in every tile of a deltille grid, with the usual border. At 2 px per
+    /// cell or more, the codes do not reduce the precision of corners.
     pub fn dense() -> Self {
         Self { family: positions::NAME.to_owned(), spacing: 1, ..Self::default() }
     }
@@ -90,7 +90,8 @@ impl TagSpec {
         self.family == positions::NAME
     }
 
-    /// Returns the tags in the given tiles of panel `panel`, with ids from `first` on for ordinary families.
+    /// Returns the tags in the given tiles of panel `panel`, with ids starting at `first` for
+    /// ordinary families.
     pub(crate) fn placements(&self, panel: u32, first: u32, tiles: &[Vertex]) -> Vec<TagPlacement> {
         let tiles = tiles.iter().zip(0..);
         let of_tile = |(tile, i): (&Vertex, u32)| TagPlacement {

@@ -11,12 +11,13 @@ use super::polyhedron::{normal, sides, triangles};
 use crate::angles::angle;
 use crate::setting::Setting::{SolidBoardId, TagFirstId};
 
-/// Largest deviation of an edge from the mean of its face, for near-equilateral faces. The faces of geodesic spheres,
-/// made of triangles as equal as a sphere allows, deviate by up to 11 %. At 15 % the board still has two thirds of
-/// the mean edge.
+/// Largest deviation of an edge from the mean of its face, for near-equilateral faces. The faces of
+/// geodesic spheres are nearly equal triangles; they deviate by up to 11 %. At 15 %, the side of
+/// the board is still two thirds of the mean edge.
 pub const NEAR_EQUILATERAL: f64 = 0.15;
 
-/// Distance below which vertices are merged, relative to the mesh's extent: the rounding of six written digits.
+/// Distance below which vertices are merged, relative to the mesh's extent: the rounding of numbers
+/// with six digits.
 const WELD: f64 = 1e-6;
 
 /// Least height of a face relative to its longest edge; a flatter face counts as having no area.
@@ -29,7 +30,8 @@ const MIN_VOLUME: f64 = 1e-6;
 /// a metre, the tolerance of a manufactured one.
 const FLAT: f64 = 1e-4;
 
-/// Sine of the smallest exterior angle at a corner of a face of four or more, 0.6°. Below it, the two sides count as
+/// Sine of the smallest exterior angle (0.6°) at a corner of a face with four or more corners.
+/// Below it, the two sides count as
 /// one line.
 const MIN_ROTATION: f64 = 0.01;
 
@@ -189,8 +191,8 @@ impl ClosedMesh {
         Ok((mesh, volume < 0.0))
     }
 
-    /// Merges neighbouring faces in one plane if the result is convex: files of triangles contain each square in two
-    /// halves. Drops vertices within straight edges.
+    /// Merges neighbouring faces in one plane if the result is convex: triangle meshes split each
+    /// square into two halves. Drops vertices within straight edges.
     ///
     /// # Errors
     /// Returns an error if the merged faces are not one closed surface.
@@ -286,8 +288,8 @@ impl ClosedMesh {
         lengths.sum::<f64>() / self.faces.iter().map(Vec::len).sum::<usize>() as f64
     }
 
-    /// Returns the triangle that is farthest from equilateral, and the largest deviation of its edges from their
-    /// mean, relative.
+    /// Returns the triangle that is farthest from equilateral, and the largest relative deviation
+    /// of its edges from their mean.
     pub fn most_skewed(&self) -> (usize, f64) {
         let deviation = |face: usize| {
             let lengths = self.lengths(face);
@@ -326,7 +328,8 @@ impl ClosedMesh {
         corners.iter().all(|v| normal.dot(v - corners[0]).abs() <= within)
     }
 
-    /// Returns whether the corners of a face of four or more all bend in the same direction, once around.
+    /// Returns whether a face with four or more corners bends in the same direction at all of them,
+    /// and only once around.
     fn is_convex(&self, face: usize) -> bool {
         let corners = self.corners(face);
         let count = corners.len();
@@ -342,7 +345,7 @@ impl ClosedMesh {
         count == 3 || rotations.iter().all(|(sine, _)| *sine > MIN_ROTATION) && around < 1.5 * TAU
     }
 
-    /// Returns the sum of the signed volumes of the tetrahedra over a vertex.
+    /// Returns the sum of the signed volumes of the tetrahedra between one vertex and the faces.
     fn volume(&self) -> f64 {
         let o = self.vertices[0];
         let surface = (0..self.faces.len()).flat_map(|face| triangles(&self.corners(face)));

@@ -10,8 +10,9 @@
 //!      a──────────────────b
 //! ```
 //!
-//! Any other face is filled with deltille tiles, with as many along its shortest side as on a triangle: all corners
-//! whose six tiles lie within its margin. A hexagon of tiles fills a hexagon; two triangles of tiles fill a rhombus
+//! Any other face is filled with deltille tiles; their number along its shortest side is that of a
+//! triangle. The corners are all those whose six tiles lie within the margin. A hexagon of tiles
+//! fills a hexagon; two triangles of tiles fill a rhombus
 //! of 60°.
 
 use glam::{DMat3, DVec2, DVec3};
@@ -22,8 +23,9 @@ use crate::targets::boards::board::board_vertices;
 use crate::targets::boards::tag_spec::MAX_ROWS;
 use crate::targets::{Incircle, Outline, PanelPose, Polyhedron};
 
-/// Cosine of the smallest angle of a rectangular face: angles may be 1° off. Along a side of 150 mm that takes 2.6
-/// mm, which the margin provides. On a face with other angles the board would be much smaller than the face.
+/// Cosine of the smallest angle of a rectangular face: angles may be 1° off. Along a side of 150
+/// mm, 1° amounts to 2.6 mm, which the margin absorbs. On a face with other angles the board would
+/// be much smaller than the face.
 const RIGHT_COSINE: f64 = 0.017_452_4;
 
 /// Fraction of a tile that may be missing before a row loses it: the effect of rounding.
@@ -251,9 +253,9 @@ impl Flat {
         })
     }
 
-    /// Places the deltille lattice for the largest number of corners. It starts at the lower left end of the margin,
-    /// which suits angles of 60° and 120°, or has a vertex, the centre of an edge or the centre of a tile in the
-    /// middle.
+    /// Positions the deltille lattice so that the number of corners is largest. The lattice starts
+    /// at the lower left end of the margin, which suits angles of 60° and 120°. Otherwise it is
+    /// centred on a vertex, an edge or a tile.
     fn filled(self, tiles: u32, margin_mm: f64) -> Option<Face> {
         let corners: Vec<DVec3> = self.outline.iter().map(|p| p.extend(0.0)).collect();
         let circle = Incircle::of(&corners);

@@ -49,7 +49,8 @@ pub struct SkeletonSpec {
     pub panel_thickness_mm: f64,
     /// Thickness of the frame below the panels, and least width of a ledge, mm.
     pub wall_mm: f64,
-    /// Distance of a seat from the edges of its face, mm; `None` for the smallest one that is solid.
+    /// Distance of a seat from the edges of its face, mm; `None` for the smallest one that gives a
+    /// solid rib.
     pub rib_mm: Option<f64>,
 }
 
@@ -95,7 +96,7 @@ impl Skeleton {
         let rib = rib_mm.unwrap_or(least_rib);
         if !(rib >= least_rib - 1e-9 && rib.is_finite()) {
             let problem = format!(
-                "{} leaves no foot where faces meet at {:.1}°: use at least {:.1} mm, or thinner \
+                "{} leaves no base for the rib where faces meet at {:.1}°: use at least {:.1} mm, or thinner \
                  panels",
                 format_mm(rib),
                 sharpest.to_degrees(),
@@ -157,8 +158,8 @@ impl Skeleton {
 pub struct Incircle {
     /// Centre of the circle; for other polygons the mean of the corners.
     pub centre: DVec3,
-    /// Radius of the circle, in the unit of the corners; for other polygons the distance at which moving sides
-    /// inwards makes one vanish.
+    /// Radius of the circle, in the unit of the corners; for other polygons, the inward distance at
+    /// which the first side vanishes.
     pub radius: f64,
     /// Unit normal of the polygon.
     pub normal: DVec3,

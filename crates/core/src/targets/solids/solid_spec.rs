@@ -35,7 +35,7 @@ const RIM_PART: f64 = 0.4;
 /// 0.01 mm at 100 m.
 const FARTHEST_MM: f64 = 1e5;
 
-/// Maximum number of triangles of all faces: meshes count their corners in 16 bits.
+/// Maximum number of triangles of all faces: mesh files index their corners with 16 bits.
 const MAX_TRIANGLES: usize = 20_000;
 
 /// Maximum number of faces of a solid.

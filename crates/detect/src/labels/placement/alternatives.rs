@@ -1,10 +1,11 @@
 //! Alternatives to a placement: hidden and dirty tiles, boards that are partly plain, and sums over them.
 
-/// Probability that a tag is hidden or damaged, so that its tile has no information.
+/// Probability that a tag is hidden or damaged, so that its tile contains no information.
 pub(super) const SPOILT: f64 = 1.0 / 16.0;
 
-/// Probabilities that an untagged tile is dirty or misread, so that its cells have no information. A cause such as a
-/// lack of focus affects all tiles equally, so the image decides which of these applies.
+/// Probabilities that an untagged tile is dirty or misread, so that its cells contain no
+/// information. A cause such as a lack of focus affects all tiles equally, so the image decides
+/// which of these applies.
 pub(super) const DIRTY: [f64; 3] = [SPOILT, 1.0 / 2.0, 1.0 - SPOILT];
 
 /// Fractions of plain tiles on the board of arbitrary plain tiles and codes: from tags in nearly all tiles to a single

@@ -11,8 +11,9 @@ use crate::grid::saddle_grid::{SaddleGrid, mirrored};
 use deltille_core::lattice::Vertex;
 use deltille_core::statistics::median;
 
-/// Contrast of a corner, relative to that predicted from its neighbours, from which no tile is missing there. At the
-/// tip of a border tile, one dark tile of three or two is missing. That leaves 2/3 to 0.8, or half, of the contrast.
+/// Contrast of a corner, relative to that predicted from its neighbours, above which no tile is
+/// missing there. At the tip of a border tile, one dark tile of three or two is missing. That
+/// leaves 2/3 to 0.8, or half, of the contrast.
 const FULL_CONTRAST: f64 = 0.9;
 
 impl TagLabeller {
@@ -39,7 +40,7 @@ impl TagLabeller {
             };
             shown.code[0] > CLEARLY_OTHER && !is_predicted && (shown.is_foreign || is_of_panel())
         };
-        // Position codes are many and similar: a misread code is another code.
+        // Position codes are numerous and similar, so a misread code is another valid code.
         let readings = 0..sight.readings.len();
         let elsewhere = readings.filter(|&index| !self.is_dense && is_elsewhere(index)).count();
         let beyond = if self.panels_abut { 0 } else { self.beyond(sight, grid, placement) };
@@ -50,10 +51,10 @@ impl TagLabeller {
         })
     }
 
-    /// Returns the number of corners beyond the panel which show that the print continues there. Along its border, tips
-    /// of tiles may pass for corners. These form a single row and have less contrast, because a tile is missing at
-    /// each. If most corners next to the panel have full contrast, they count. Tiles with all corners beyond the panel
-    /// always count.
+    /// Returns the number of corners beyond the panel which show that the print continues there.
+    /// Along its border, tips of tiles may be mistaken for corners. These form a single row and
+    /// have less contrast, because a tile is missing at each. If most corners next to the panel
+    /// have full contrast, they count. Tiles with all corners beyond the panel always count.
     fn beyond(&self, sight: &Sight, grid: &SaddleGrid, placement: &Placement) -> usize {
         let Some(kind) = sight.readings.first().map(|reading| reading.tile.kind()) else {
             return 0;

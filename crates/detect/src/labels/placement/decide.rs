@@ -26,7 +26,8 @@ const BEYOND_DOUBT: f64 = 40.0;
 /// Maximum number of placements that are evaluated, best proposals first.
 const MAX_PROPOSALS: usize = 64;
 
-/// Maximum number of tiles that are read in a grid: with so many, the evidence is conclusive or worthless.
+/// Maximum number of tiles that are read in a grid. With this many tiles, the evidence is
+/// conclusive or worthless.
 pub(super) const MAX_TILES: usize = 2000;
 
 /// Time to read a tile from the image, in comparisons of a tile with one word.
@@ -72,8 +73,8 @@ impl TagLabeller {
         self.decide(sights, grid, evidence)
     }
 
-    /// Completes the evidence of a grid with the panels that its sights identify. The mirror image is tested only if
-    /// the direct image leaves doubt.
+    /// Completes the evidence of a grid with the panels that its sights identify. The mirror image
+    /// is tested only if the result of the direct image is uncertain.
     pub(super) fn decide(
         &self,
         mut sights: Vec<Sight>,
@@ -121,8 +122,9 @@ impl TagLabeller {
         tagged.map(LabelPanel::way).collect()
     }
 
-    /// Returns the placements with sufficient evidence, best first. Each takes its corners from the grid. The others
-    /// are judged again by the remaining tiles, because several faces of a solid may lie in one grid.
+    /// Returns the placements with sufficient evidence, best first. Each takes its corners from the
+    /// grid. The others are evaluated again on the remaining tiles, because several faces of a
+    /// solid may lie in one grid.
     fn place(&self, sights: &[Sight], grid: &SaddleGrid) -> Placed {
         let proposals = self.proposals(sights);
         let tiles: usize = sights.iter().map(|sight| sight.readings.len()).sum();
@@ -190,8 +192,9 @@ impl TagLabeller {
         placed
     }
 
-    /// Returns the placements that single tiles propose, sorted by the evidence of these tiles. The sum omits evidence
-    /// against a placement, because it only selects those that are judged.
+    /// Returns the placements that single tiles propose, sorted by the evidence of these tiles. The
+    /// sum omits evidence against a placement, because it only selects the placements that are
+    /// evaluated.
     fn proposals(&self, sights: &[Sight]) -> Vec<Placement> {
         let rotations = self.words.rotations();
         let mut sums: HashMap<(usize, usize, LatticeMap), f64> = HashMap::new();

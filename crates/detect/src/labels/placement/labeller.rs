@@ -10,7 +10,8 @@ use deltille_core::family::{Decoder, Family, NaturalWords};
 use deltille_core::lattice::{GridKind, Tile, Vertex};
 use deltille_core::targets::{TagsIn, Target};
 
-/// Maximum number of comparisons of a tile with a word in an image: some hundredths of a second.
+/// Maximum number of comparisons of a tile with a word per image. They take a few hundredths of a
+/// second.
 const BUDGET: usize = 4_000_000;
 
 /// Remaining computing time for tags in an image, in comparisons of a tile with a word. It is counted instead of
@@ -54,9 +55,10 @@ pub(crate) struct TagEvidence {
     pub no_codes: usize,
     /// Number of tiles whose cells do not determine a code of the family, if no panel was identified.
     pub unread: usize,
-    /// Whether a placement has sufficient evidence, but another one nearly as much.
+    /// Whether a placement has sufficient evidence, but another one has almost the same evidence.
     pub is_ambiguous: bool,
-    /// Numbers of tiles that agree and disagree with a placement whose evidence suffices without the latter.
+    /// Numbers of tiles that agree and disagree with a placement whose evidence would suffice
+    /// without the disagreeing tiles.
     pub contradicted: Option<[usize; 2]>,
     /// Whether the budget was exhausted before the grid was read.
     pub is_cut_short: bool,
@@ -74,9 +76,10 @@ pub(crate) struct TagLabeller {
     pub(super) is_dense: bool,
     /// Decoder of the whole family; `None` for position codes, because each of their words is a code.
     pub(super) decoder: Option<Decoder>,
-    /// Probabilities of words in natural images, for triangular tags of which one alone identifies a position.
+    /// Probabilities of words in natural images, for families of triangular tags whose single tags
+    /// identify a position.
     pub(super) natural: Option<NaturalWords>,
-    /// Maximum number of misread cells at which a word certainly is a code of the family.
+    /// Maximum number of misread cells at which a word is certainly a code of the family.
     pub(super) sure_errors: u32,
     /// Number of words of the family.
     pub(super) family_words: usize,
@@ -86,7 +89,7 @@ pub(crate) struct TagLabeller {
     pub(super) words: TargetWords,
     /// Properties of each panel of the target, in order.
     pub(super) panels: Vec<LabelPanel>,
-    /// Whether several panels may lie in one grid, as the faces of a solid.
+    /// Whether several panels may lie in one grid, like the faces of a solid.
     pub(super) panels_abut: bool,
     /// Panels and tiles of each code of the target.
     pub(super) places: Vec<Vec<(usize, Tile)>>,
@@ -153,7 +156,7 @@ impl TagLabeller {
             target.panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id).collect();
         let coded: BTreeMap<u32, u64> =
             ids.into_iter().filter_map(|id| Some((id, family.code(id)?))).collect();
-        // Many positions of a board of position codes show the same.
+        // Many positions of a board of position codes show the same code.
         let mut shown = BTreeSet::new();
         let ids: Vec<u32> =
             coded.iter().filter(|&(_, code)| shown.insert(code)).map(|(&id, _)| id).collect();

@@ -38,8 +38,8 @@ pub(super) struct Placement {
 }
 
 impl TagLabeller {
-    /// Returns the evidence for a placement, nats, from tiles without taken corners: the log-likelihood of its
-    /// prediction, less that of the better of the two boards that are not the target.
+    /// Returns the evidence for a placement, nats, from tiles without taken corners: the
+    /// log-likelihood of its prediction minus that of the better of the two alternative boards.
     pub(super) fn evidence(
         &self,
         sight: &Sight,
@@ -57,7 +57,8 @@ impl TagLabeller {
         mean(predicted) - greatest(of_board).max(mean(other_codes))
     }
 
-    /// Returns the evidence for a placement over natural images, nats, if a single tag supports it.
+    /// Returns the evidence for a placement relative to natural images, nats, if a single tag
+    /// supports it.
     pub(super) fn over_nature(&self, sight: &Sight, placement: &Placement) -> Option<f64> {
         let natural = self.natural.as_ref()?;
         let mut speaking = self.expected(placement).filter_map(|(tile, tag, rotations)| {

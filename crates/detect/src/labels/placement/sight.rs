@@ -7,8 +7,8 @@ use super::labeller::{TagEvidence, TagLabeller, Way};
 use crate::labels::tags::Reading;
 use deltille_core::lattice::Tile;
 
-/// Evidence from which a tile certainly shows a code that is not predicted, nats: a code that the target does not have,
-/// or has elsewhere.
+/// Minimum evidence, nats, that a tile certainly shows a code that is not predicted: a code that
+/// the target does not have, or has elsewhere.
 pub(super) const CLEARLY_OTHER: f64 = 7.0;
 
 /// Readings of the tiles of a grid in one way.
@@ -36,14 +36,14 @@ pub(super) struct Shown {
     pub(super) is_foreign: bool,
     /// For random cells or the best of all codes, whichever fits better: with `word` among the codes, and without it.
     pub(super) code: [f64; 2],
-    /// For a tile of a board of which each fraction in [`PLAIN_PARTS`] is plain and the other tiles show the best code:
-    /// with `word` and without it, as above.
+    /// For a board with each fraction of plain tiles in [`PLAIN_PARTS`], whose other tiles show the
+    /// best code: with `word` and without it, as above.
     pub(super) of_board: [[f64; PLAIN_PARTS.len()]; 2],
 }
 
 impl TagLabeller {
-    /// Compares readings with all words of the target. Further findings, such as codes of the family that the target
-    /// does not have, are added to `noted`.
+    /// Compares readings with all words of the target. Adds further findings to `noted`, for
+    /// example codes of the family that the target does not have.
     pub(super) fn sight(&self, way: Way, readings: Vec<Reading>, noted: &mut TagEvidence) -> Sight {
         let plain = self.readers[way.reader].plain_word();
         let mut evidence = Vec::with_capacity(readings.len());
@@ -120,9 +120,9 @@ fn is_word(reading: &Reading) -> bool {
     /// Minimum fraction of certain cells. It identifies 11 of 64 boards of other families, and mistakes 3 of 160 other
     /// boards, all dirty, for one. With 8 of 10 these are 15 and 9, with 19 of 20 they are 10 and 1.
     const SURE_CELLS: [usize; 2] = [9, 10];
-    /// At least one cell in so many must have the other colour, because an untagged tile has one colour except for
-    /// dirt. Of 16 random cells, fewer have it once in 240 times; of 25, once in 1100. With 3, no dirt counts as a tag,
-    /// but one tag in 5 of 16 cells is missed.
+    /// At least one in this many cells must have the other colour, because an untagged tile has one
+    /// colour except for dirt. Fewer have it in one of 240 tiles of 16 random cells, and in one of
+    /// 1100 tiles of 25. With 3, no dirt counts as a tag, but one in 5 tags of 16 cells is missed.
     const MIN_OTHER: usize = 6;
     // Free cells contain no information.
     let n = reading.half_odds.iter().filter(|odds| odds.abs() > 0.0).count();

@@ -14,7 +14,8 @@ use deltille_core::family::{Decoder, Family, shipped_names, square_names};
 use deltille_core::lattice::{Tile, Vertex};
 use deltille_core::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
 
-/// Noise, of full scale, at which more than a tenth of the cells of 4 px per bit are misread.
+/// Noise, as a fraction of full scale, at which more than a tenth of the cells of 4 px per bit are
+/// misread.
 const NOISE_OF_A_TENTH: f64 = 0.335;
 
 /// Half odds of a certain cell.
@@ -65,7 +66,7 @@ fn board_of(family: &Family, [rows, cols]: [u32; 2], tags: TagSpec) -> Option<Ta
     Target::build("board", &TargetSpec::Board(spec), Some(family)).ok()
 }
 
-/// Boards of every family with about so many first ids, direct and mirrored.
+/// Boards of every family with about this many first ids, direct and mirrored.
 fn labels_are_those_of_the_print(first_ids: usize) {
     for name in shipped_names().into_iter().chain(square_names()) {
         let family = Family::shipped(name).unwrap();
@@ -172,8 +173,8 @@ fn boards_of_other_rows_and_columns_get_no_labels() {
     }
 }
 
-/// A board has the tags of some faces, but not as they lie on a solid: around each face that fits, and between them,
-/// are others.
+/// A board has the tags of some faces, but not in the arrangement of the solid: around each face
+/// that fits, and between these faces, there are other tags.
 #[test]
 fn boards_are_not_taken_for_faces_of_solids() {
     for name in shipped_names() {
@@ -200,8 +201,8 @@ fn boards_are_not_taken_for_faces_of_solids() {
     }
 }
 
-/// A part of the board with one tag, in an image of nothing else, is labelled. It is not labelled if a single other
-/// tile clearly belongs to another board.
+/// A part of the board with one tag, with nothing else in the image, is labelled. It is not
+/// labelled if a single other tile clearly belongs to another board.
 #[test]
 fn one_tag_labels_where_nothing_contradicts_it() {
     let family = Family::shipped("delTag25h7").unwrap();
@@ -237,8 +238,9 @@ fn one_tag_labels_where_nothing_contradicts_it() {
     }
 }
 
-/// A white corner, as in natural images, is a code of a family without a complexity rule. Alone it labels nothing. With
-/// another tag beside it, it does, and so does a complex code alone.
+/// A white corner, which is common in natural images, is a code of a family without a complexity
+/// rule. Alone, it is not sufficient for a label. With another tag next to it, it is sufficient,
+/// and so is a complex code alone.
 #[test]
 fn one_natural_looking_tag_gives_no_labels() {
     let complex = Family::shipped("d36h9").unwrap();
@@ -268,7 +270,7 @@ fn one_natural_looking_tag_gives_no_labels() {
 }
 
 /// Patches of three by four tiles of a board of a thousand tiles, anywhere, rotated and mirrored. One of twenty cells
-/// is misread, and three of ten tiles are hidden by objects with cells of their own.
+/// is misread, and three of ten tiles are hidden by objects that show other cells.
 #[test]
 fn patches_of_dense_boards_tell_their_place() {
     use rand::{Rng, SeedableRng};
@@ -382,7 +384,7 @@ fn noisy_tags(noise: f64, views: u64, words_a_view: usize) -> NoisyTags {
     for seed in 0..views {
         let tag = &panel.tags[seed as usize % panel.tags.len()];
         let tile = panel.tag_tile(tag);
-        // Only the corners of the tag's tile and of those that touch it are seen.
+        // Only the corners of the tag's tile and of the tiles that touch it are visible.
         let near: BTreeSet<Vertex> = tile
             .vertices()
             .chain(tile.vertices().flat_map(|v| family.kind().neighbours(v)))
@@ -473,7 +475,7 @@ fn evidence_reads_noisy_tags_with_no_more_errors_than_decisions() {
     assert!(seen.by_evidence > seen.by_decisions);
 }
 
-/// Random content of a board's tiles is taken for tags of another board less often than allowed.
+/// Random content of a board's tiles is mistaken for tags of another board less often than allowed.
 #[test]
 fn boards_of_random_words_get_no_labels() {
     use rand::{Rng, SeedableRng};
@@ -488,7 +490,8 @@ fn boards_of_random_words_get_no_labels() {
         let panel = &target.panels[0];
         let grid: SaddleGrid = panel_vertices(panel).into_iter().map(|v| (v, placed)).collect();
         let wrong = (0..1000).filter(|trial| {
-            // From a single tile, the hardest to reject, to many; cells certain or nearly undetermined.
+            // From a single tile, which is the hardest case to reject, to many tiles. Cells are
+            // certain or nearly undetermined.
             let tiles = grid.keys().map(|&v| Tile::upright(v)).take(1 + trial % 40);
             let strength = [2.6, 1.0, 0.3][trial % 3];
             let readings = tiles

@@ -10,17 +10,18 @@ use crate::refine::blurred_corner::{
 };
 use deltille_core::detection::TONE_PARAMS;
 
-/// First of the rows behind the residual, for the parameters that all corners share: amplitude · (1 − S²).
+/// First of the rows after the residual, for the parameters that all corners share: amplitude · (1
+/// − S²).
 pub(super) const RISE: usize = PARAMS + 1;
 /// S.
 pub(super) const SHADE: usize = PARAMS + 2;
-/// Derivatives by the two parameters of astigmatism.
+/// Derivatives with respect to the two parameters of astigmatism.
 pub(super) const ASTIGMATISM: usize = PARAMS + 3;
-/// Derivatives by the strength of the halo.
+/// Derivatives with respect to the strength of the halo.
 pub(super) const HALO: usize = PARAMS + 5;
-/// Derivatives by the ink.
+/// Derivatives with respect to the ink.
 pub(super) const INK: usize = PARAMS + 6;
-/// Derivatives by the parameters of the tone curve.
+/// Derivatives with respect to the parameters of the tone curve.
 pub(super) const TONE: usize = PARAMS + 7;
 
 /// Number of rows, in blocks of four.
@@ -38,7 +39,7 @@ pub(super) fn fill_columns<const K: usize, const JOINT: bool>(
     corner: &Corner<K>,
     look: &Look<K>,
 ) {
-    // By constants first: branches that they exclude are not compiled.
+    // Dispatches on constants first: branches that they exclude are not compiled.
     if K == 2 {
         let is_square = look.rho.abs() <= FEW_NODES_RHO;
         match (look.way, is_square) {

@@ -23,8 +23,8 @@ pub(super) const SLOPE: usize = 5;
 /// The first angle; the others follow.
 pub(super) const ANGLE: usize = 7;
 
-/// Maximum change of the logarithm of the blur in one step. Linear equations contain little information on a blur that
-/// is e times as wide.
+/// Maximum change of the logarithm of the blur in one step. Linear equations contain little
+/// information about a blur that is e times as wide.
 const MAX_LN_BLUR: f64 = 1.0;
 
 /// Minimum blur that can be distinguished within a window, px: that of a pixel's box. The maximum is half the radius.
@@ -43,15 +43,17 @@ pub(crate) struct Corner<const K: usize> {
     pub position: DVec2,
     /// Standard deviation of the blur including the pixel's box, px.
     pub blur_px: f64,
-    /// Half the contrast, of full scale; negative if the sector before the first edge is dark.
+    /// Half the contrast, as a fraction of full scale; negative if the sector before the first edge
+    /// is dark.
     pub amplitude: f64,
-    /// Half-way between dark and bright, of full scale.
+    /// Mean of dark and bright, as a fraction of full scale.
     pub level: f64,
     /// Relative change of the illumination per pixel.
     pub slope: DVec2,
     /// Image angles of the edges, increasing within 180°, radians.
     pub angles: [f64; K],
-    /// Curvatures of the edges, to the left of their directions (towards greater v of u), 1/px.
+    /// Curvatures of the edges, to the left of their directions (towards greater v for the
+    /// direction u), 1/px.
     pub bends: [f64; K],
     /// Distance from each edge of a point one edge length away on the print, px; 0 without a grid.
     pub across_px: [f64; K],

@@ -49,7 +49,7 @@ const ROUGH: f64 = 0.15;
 /// at most a third, then changes by the same fraction of itself.
 const SAME_LIGHT: f64 = 0.01;
 
-/// The same for a start, whose light another fit refines.
+/// The same for a rough fit, whose light another fit refines.
 const ROUGHLY_SAME_LIGHT: f64 = 0.1;
 
 /// Distance from the corner at which a rotation moves an edge as much as the position does, px: the end of the smallest
@@ -62,12 +62,12 @@ pub(super) const MIN_NOISE: f64 = 2e-5;
 /// Maximum distance of a corner from its start, px; the start is the result of the polynomial.
 pub(crate) const MAX_WAY_PX: f64 = 1.5;
 
-/// Maximum residual, relative to the amplitude. With a larger one the window shows something else, unless the residuals
-/// vary from pixel to pixel like noise.
+/// Maximum residual, relative to the amplitude. With a larger residual, the window shows something
+/// other than a corner, unless the residuals vary from pixel to pixel like noise.
 const MAX_RESIDUAL: f64 = 0.35;
 
-/// Mean squared difference of neighbouring residuals, relative to white noise (von Neumann's ratio), above which they
-/// are noise. For residuals with a shape it is a fraction.
+/// Mean squared difference of neighbouring residuals, relative to white noise (von Neumann's
+/// ratio), above which residuals are noise. Systematic residuals have a fraction of this ratio.
 const MIN_WHITENESS: f64 = 0.7;
 
 /// Maximum standard deviation of a valid position, px.
@@ -79,7 +79,7 @@ const UNLIMITED: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
 /// Accuracy of a fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Accuracy {
-    /// Some hundredths of a pixel: a start for another fit.
+    /// A few hundredths of a pixel: a start for another fit.
     Rough,
     /// Limited by the noise.
     Full,
@@ -92,20 +92,22 @@ pub(crate) struct Fitted<const K: usize> {
     pub corner: Corner<K>,
     /// Covariance xx, xy, yy of the position, px².
     pub cov: [f64; 3],
-    /// Standard deviation of the noise, of full scale.
+    /// Standard deviation of the noise, as a fraction of full scale.
     pub noise: f64,
-    /// Mean squared difference of neighbouring residuals, relative to white noise: less if they have a shape.
+    /// Mean squared difference of neighbouring residuals, relative to white noise. It is smaller
+    /// for systematic residuals.
     pub whiteness: f64,
 }
 
-/// Fits corners. Contains the work space, so one fitter serves one thread.
+/// Fits corners. A fitter owns its workspace, so each thread needs its own.
 #[derive(Clone, Debug)]
 pub(crate) struct CornerFitter {
-    /// Pixels of full scale 1.
+    /// Pixels; full scale is 1.
     pub(super) pixels: Box<[f32; MAX_PIXELS]>,
-    /// Derivatives by the parameters, then the residual.
+    /// Derivatives with respect to the parameters, then the residual.
     pub(super) columns: Box<Columns>,
-    /// Black and white that pixels have reached, or values beyond all.
+    /// Values at which the sensor clipped pixels of the window, or infinite values if it clipped
+    /// none.
     pub(super) limits: [f32; 2],
 }
 
@@ -273,7 +275,8 @@ impl CornerFitter {
         Some(centre)
     }
 
-    /// Returns the pixels around a position, full scale 1; `None` if one lies outside the image.
+    /// Returns the pixels around a position, with a full scale of 1; `None` if one lies outside the
+    /// image.
     pub(crate) fn pixels(
         &mut self,
         image: ImageView,
@@ -370,7 +373,7 @@ mod tests {
     use super::*;
     use deltille_core::raster::Gray;
 
-    /// A corner off the centre of its window, in slanting light, with bent edges.
+    /// A corner off the centre of its window, in uneven light, with curved edges.
     fn corner<const K: usize>(amplitude: f64) -> Corner<K> {
         Corner {
             position: DVec2::new(0.3, -0.2),
@@ -430,7 +433,8 @@ mod tests {
         }
     }
 
-    /// From a start beside the corner, the fit of a rendered model finds every parameter and leaves no residual.
+    /// From a start near the corner, the fit to a rendered model finds every parameter and leaves
+    /// no residual.
     #[test]
     fn a_corner_is_recovered_from_its_own_image() {
         fn check<const K: usize>(truth: &Corner<K>, optics: &Optics) {

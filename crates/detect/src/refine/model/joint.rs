@@ -25,7 +25,7 @@ pub(crate) enum Common {
     Ink,
 }
 
-/// Number of parameters of the optics, behind the corner's own.
+/// Number of parameters of the optics, which follow the corner's own.
 pub(crate) const COMMON: usize = COMMON_PARAMS;
 
 /// Number of all parameters.
@@ -130,7 +130,7 @@ impl CornerFitter {
         let column = |weights: [f32; PARAMS]| -> Vec<f32> {
             let mut sums = vec![0.0; window.count];
             let columns = weights.iter().zip(&self.columns[..ANGLE + K]);
-            // Half of the entries of a triangle are zero.
+            // Half of the entries of a triangular matrix are zero.
             for (weight, column) in columns.filter(|(weight, _)| **weight != 0.0) {
                 sums.iter_mut().zip(column).for_each(|(sum, value)| *sum += weight * value);
             }

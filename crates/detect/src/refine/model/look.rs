@@ -14,7 +14,8 @@ pub(super) struct Look<const K: usize> {
     pub(super) sharpness: [f64; K],
     /// ∂ ln s_k/∂θ_k.
     pub(super) by_turn: [f64; K],
-    /// Correlation of the blur along the first two normals, and its derivatives by their angles.
+    /// Correlation of the blur along the first two normals, and its derivatives with respect to
+    /// their angles.
     pub(super) rho: f64,
     pub(super) rho_by_angle: [f64; 2],
     /// ∂ ln s_k/∂e and ∂ρ/∂e of both parameters of astigmatism.
@@ -26,13 +27,14 @@ pub(super) struct Look<const K: usize> {
     pub(super) halo: [f32; 2],
     /// ∂ ln s/∂α of the blur of the pattern, at a constant slope of the edges.
     pub(super) core_by_halo: f32,
-    /// Half of the motion across the edges during exposure, in units of the blur, if there is motion. Also its
-    /// derivatives by the angles and by both parameters of astigmatism.
+    /// Half of the motion across the edges during exposure, in units of the blur, if there is
+    /// motion. Also its derivatives with respect to the angles and to both parameters of
+    /// astigmatism.
     pub(super) way: Option<[f32; K]>,
     pub(super) way_by_turn: [f64; K],
     pub(super) way_by_astigmatism: [[f64; K]; 2],
-    /// Displacement of the edges by ink, in units of the blur, its derivatives by the ink, and the triangle between
-    /// them.
+    /// Displacement of the edges by ink, in units of the blur, its derivatives with respect to the
+    /// ink, and the triangle between them.
     pub(super) displaced: [f64; K],
     pub(super) by_ink: [f64; K],
     pub(super) triangle: Option<Triangle>,
@@ -110,7 +112,8 @@ impl<const K: usize> Look<K> {
         self.haloed_of(|_| pattern)
     }
 
-    /// Returns the haloed pattern for a pattern with lengths of its own, which are multiplied by a number.
+    /// Returns the haloed pattern. `pattern` creates the pattern with its own lengths multiplied by
+    /// a factor.
     pub(super) fn haloed_of<P>(&self, pattern: impl Fn(f32) -> P) -> Haloed<P> {
         let [strength, width] = self.halo;
         Haloed {
@@ -125,7 +128,7 @@ impl<const K: usize> Look<K> {
 /// Returns the displacement of the edges by an ink of 1, in units of the blur.
 ///
 /// If the contrast is positive, dark areas lie on the right of the first and the third edge, and on the left of the
-/// second. With two edges, the halves move in opposite directions, and the corner stays.
+/// second. With two edges, the halves move in opposite directions, and the corner does not move.
 fn by_ink<const K: usize>(corner: &Corner<K>, sharpness: [f64; K]) -> [f64; K] {
     std::array::from_fn(|k| match (K, k) {
         (3, 1) => -INK_UNIT * corner.amplitude.signum() * corner.across_px[k] * sharpness[k],
@@ -134,15 +137,16 @@ fn by_ink<const K: usize>(corner: &Corner<K>, sharpness: [f64; K]) -> [f64; K] {
     })
 }
 
-/// Returns the triangle between three edges displaced by ink, with its derivatives by ln s, the angles and the ink. The
-/// sines and cosines of the corner's angles are passed with it.
+/// Returns the triangle between three edges displaced by ink, with its derivatives with respect to
+/// ln s, the angles and the ink. The sines and cosines of the corner's angles are passed with it.
 fn triangle<const K: usize>(
     corner: &Corner<K>,
     rotations: [(f64, f64); K],
     optics: &Optics,
     spread: &Spread,
 ) -> Triangle {
-    /// Step in the logarithm of the blur, radians and units of ink: the quotient is accurate to some 1/10 000.
+    /// Step in the logarithm of the blur, radians and units of ink: the quotient is accurate to
+    /// about 1/10 000.
     const STEP: f64 = 1e-4;
     let core = optics.core();
     let overlap = |blur_px: f64, rotations: [(f64, f64); K], ink: f64| {

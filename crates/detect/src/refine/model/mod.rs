@@ -8,21 +8,23 @@
 //! ```
 //!
 //! Ink spread on the print makes dark areas grow. It displaces every line of a corner of three edges, both halves to
-//! the same side, by ink times the image of an edge across it. The three lines then do not meet. The position is where
-//! they would meet on a print without ink spread. With two edges, the halves move in opposite directions, and the
-//! corner stays.
+//! the same side, by the ink spread times the image length of a tile edge across it. The three
+//! lines then do not meet. The position is where they would meet on a print without ink spread.
+//! With two edges, the halves move in opposite directions, and the corner does not move.
 //!
-//! T is the tone curve of the camera between the corner's black and white. r is the sum of their light over its
-//! difference ([`deltille_core::detection::tone`]). For a linear camera T(S) = S and I = (level + amplitude·f)·g. M, of
-//! trace 2, gives the direction of stronger blur; for motion the blur is a box. Both, and halos in f, are the same over
-//! the whole image and given: [`crate::refine::optics`]. Values brighter than white or darker than black are clipped.
-//! Where pixels are clipped, the model is clipped too, so that they count only where the model is within the limits.
+//! T is the tone curve of the camera between the corner's black and white. r is the sum of their
+//! light divided by the difference ([`deltille_core::detection::tone`]). For a linear camera T(S) =
+//! S and I = (level + amplitude·f)·g. M, of trace 2, gives the direction of stronger blur; for
+//! motion the blur is a box. These, and halos in f, are the same over the whole image and are
+//! given: [`crate::refine::optics`]. Values brighter than white or darker than black are clipped.
+//! Where pixels are clipped, the model is clipped too, so that they count only where the model is
+//! within the limits.
 //!
 //! The curvatures κ of the edges by lens distortion are given, because a window is too small to distinguish them from
 //! the position. (u, v) are pixels from the window's centre. f is the blurred corner of
-//! [`crate::refine::blurred_corner`]. The blur s contains the pixel's own box as a variance of 1/12. Compared with
-//! exact integration, this causes no measurable error from 0.5 px of blur upwards (docs/benchmarks). A weak prior
-//! pulls the slopes g to 0; all other parameters are free.
+//! [`crate::refine::blurred_corner`]. The blur s contains the pixel's own box as a variance of
+//! 1/12. Compared with exact integration, this causes no measurable error if the blur is at least
+//! 0.5 px (docs/benchmarks). A weak prior pulls the slopes g to 0; all other parameters are free.
 //!
 //! The covariance is σ² (JᵀJ + prior)⁻¹ with the noise σ estimated from the residuals. It is accurate if the noise is
 //! white and the window shows only the corner; JPEG noise is not white.

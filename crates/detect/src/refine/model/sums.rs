@@ -6,7 +6,8 @@ use super::columns::Columns;
 use super::window::MAX_PIXELS;
 use crate::lanes::LANES;
 
-/// Returns the products of every two of the first N columns, over `count` pixels. Only the upper half is filled.
+/// Returns the products of all pairs of the first N columns, over `count` pixels. Only the upper
+/// half is filled.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn products<const N: usize>(columns: &mut Columns, count: usize) -> [[f64; N]; N] {
     let padded = count.next_multiple_of(LANES).min(MAX_PIXELS);
@@ -33,7 +34,7 @@ pub(super) fn products<const N: usize>(columns: &mut Columns, count: usize) -> [
     products
 }
 
-/// Lanes of a sum of products: so many of eight sums fit into registers.
+/// Lanes of a sum of products: with this many, eight sums fit into registers.
 const HALF: usize = LANES / 2;
 
 /// Returns the products of two columns with four others: eight independent sums. They are named one by one so that each
@@ -68,7 +69,7 @@ fn products_of_blocks(
     *sums = [ac, ad, ae, af, bc, bd, be, bf];
 }
 
-/// Returns their sum, by halves.
+/// Returns the sum of the lanes, added pairwise.
 #[inline(always)]
 fn sum_of_eight(lanes: &[f32; HALF]) -> f32 {
     let mut four = [0.0; HALF / 2];

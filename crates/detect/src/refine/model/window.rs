@@ -88,7 +88,8 @@ impl Window {
         [&self.u[..self.count], &self.v[..self.count]]
     }
 
-    /// Reads the pixels around `centre`, full scale 1. Returns `None` if one lies outside the image.
+    /// Reads the pixels around `centre`; full scale is 1. Returns `None` if one lies outside the
+    /// image.
     pub(super) fn read(
         &self,
         image: ImageView,

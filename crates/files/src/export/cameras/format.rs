@@ -76,7 +76,7 @@ impl Format for CameraFormat {
     }
 
     fn help(&self) -> String {
-        let and_json = ", which every command here reads, and <name>.json with uncertainties, poses and, with \
+        let and_json = ": the camera file for all deltille commands; <name>.json: uncertainties, poses and, with \
                         --residuals, every corner";
         format!("<name>{}{}", self.end, if self.is_own() { and_json } else { "" })
     }

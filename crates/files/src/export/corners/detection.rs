@@ -21,10 +21,12 @@ pub const SCHEMA: &str = "deltille/detection/1";
 #[non_exhaustive]
 pub enum DetectionFileError {
     /// The file is not JSON, or truncated.
-    #[error("not a detection file: {}; make it again with {DetectionWrite}", in_words(.0))]
+    #[error("not a detection file: {}; create it again with {DetectionWrite}", in_words(.0))]
     Json(serde_json::Error),
     /// The file has another version of the schema.
-    #[error("field `schema` is `{found}`, but this version reads `{SCHEMA}`: make the file again")]
+    #[error(
+        "field `schema` is `{found}`, but this version reads `{SCHEMA}`: create the file again"
+    )]
     Schema {
         /// The schema that the file names.
         found: String,
@@ -36,7 +38,7 @@ pub enum DetectionFileError {
         found: String,
     },
     /// A field is missing or unknown, or has an invalid value.
-    #[error("field `{field}`: {problem}; make the file again with {DetectionWrite}")]
+    #[error("field `{field}`: {problem}; create the file again with {DetectionWrite}")]
     Field {
         /// The field, for example `grids[0].corners[3].x`.
         field: String,

@@ -91,13 +91,13 @@ pub enum MeshError {
         most_mm: f64,
     },
     /// A solid that is not convex.
-    #[error("{0} is not convex, so it cannot be made as two bodies")]
+    #[error("{0} is not convex, so it cannot be exported as two bodies")]
     Dented(String),
     /// Shapes of the drawing cross each other.
-    #[error("its drawing crosses itself, so it cannot be made as two bodies")]
+    #[error("its outlines intersect each other, so it cannot be exported as two bodies")]
     Crossing,
     /// A skeleton is not a closed body.
-    #[error("the skeleton cannot be made as one body: {0}")]
+    #[error("the skeleton does not form one closed body: {0}")]
     Skeleton(#[from] ClosedMeshError),
     /// The faces cannot be made.
     #[error(transparent)]

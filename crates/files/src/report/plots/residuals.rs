@@ -244,7 +244,7 @@ pub(in crate::report) fn against_place(
             1.0,
             "distance of the target, mm",
             "Error against distance",
-            "The rms of each view against the distance of the target. The views should cover near and far.",
+            "The rms of each view against the distance of the target. The views should cover short and long distances.",
         ),
     };
     let farthest = places.iter().copied().fold(least, f64::max);

@@ -37,8 +37,8 @@ pub(in crate::report) fn section(camera: &CameraEstimate, tried: &[Candidate]) -
          <th>model</th><th>parameters</th><th>held-out rms, px</th><th>training rms, px</th>\
          <th>difference, px</th><th>largest, px</th><th></th></tr>{}</table></div><p class=\"note\">Each model was calibrated from two \
          thirds of a sample of the views and evaluated on the rest, where only poses are estimated. A model with too few parameters has \
-         a larger held-out rms; one with too many does not reduce it. The differences (rms and largest) compare projections at infinity with those of \
-         the camera of this page, within the region with corners, after the rotation that minimizes them. For the model of this page they show the effect of using fewer views.</p></section>\n",
+         a larger held-out rms; one with too many does not reduce it. The differences (rms and largest) compare \
+         projections at infinity with those of the camera in this report, within the region with corners, after the rotation that minimizes them. For the model in this report they show the effect of using fewer views.</p></section>\n",
         escaped(&verdict),
         rows.collect::<String>()
     )
@@ -57,7 +57,7 @@ fn row(camera: &CameraEstimate, one: &Candidate, worst: f64) -> String {
         [format!("{:.3}", of.rms_px), format!("{:.2}", of.largest_px)]
     });
     let notes = [
-        (own, "this page"),
+        (own, "this report"),
         (one.chosen, "simplest adequate model"),
         (one.is_adequate && !one.chosen, "equally good"),
         (one.held_out_px.is_some() && !one.is_stable, "ill-conditioned parameters"),

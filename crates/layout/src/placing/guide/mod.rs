@@ -30,7 +30,8 @@ use deltille_core::targets::format_mm;
 use deltille_core::targets::{Incircle, Target, TargetError, TargetSpec};
 use deltille_core::words::counted;
 
-/// Range of paper sides used for the guide page, mm: what a desktop printer prints. Otherwise, the page is A4.
+/// Range of paper sides used for the guide page, mm: the sizes that desktop printers print. For
+/// other paper, the page is A4.
 const AT_A_DESK_MM: [f64; 2] = [140.0, 360.0];
 /// Capital heights of the name, of the steps and of small texts, mm.
 const NAME_CAP_MM: f64 = 6.0;
@@ -144,7 +145,7 @@ impl Page {
         self.sheet.texts.push(SheetText { text, at_mm, angle_rad, cap_height_mm, max_width_mm });
     }
 
-    /// Adds a text centred at a position.
+    /// Adds a line of text centred at a position.
     fn centred(&mut self, text: String, middle: DVec2, cap_mm: f64) {
         let width = text.chars().count() as f64 * ADVANCE_CAPS * cap_mm;
         self.text(text, middle - DVec2::new(width, cap_mm) / 2.0, cap_mm);
@@ -283,7 +284,7 @@ fn height(steps: &[Vec<String>]) -> f64 {
     lines as f64 * LINE_SPACING_MM + steps.len() as f64 * STEP_SPACING_MM
 }
 
-/// Wraps a text at spaces into lines of at most `most` characters.
+/// Wraps text at spaces into lines of at most `most` characters.
 fn wrapped(text: &str, most: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split(' ') {
@@ -315,7 +316,7 @@ mod tests {
         let solid = guide(SolidSpec::new(SolidShape::Cube));
         let bare = guide(SolidSpec { tags: None, ..SolidSpec::new(SolidShape::Cube) });
         for (sheet, words) in
-            [(&board, "bubbles"), (&solid, "Score dashed"), (&bare, "faces look alike")]
+            [(&board, "bubbles"), (&solid, "Score dashed"), (&bare, "distinguished")]
         {
             assert_eq!((sheet.width_mm, sheet.height_mm), (210.0, 297.0));
             let on_page =

@@ -148,7 +148,8 @@ impl Model {
     }
 }
 
-/// Returns outlines and hatching of the black tiles of a panel, in its frame, mm; empty if there are too many to be
+/// Returns the outlines and the hatching of the black tiles of a panel, in its frame, mm; empty if
+/// there are too many to be
 /// visible.
 fn tile_lines(panel: &Panel) -> Vec<[DVec2; 2]> {
     let tiles = panel.dark_tiles();

@@ -9,8 +9,8 @@ use deltille_core::targets::{BoardSpec, SolidSpec, Target, TargetSpec};
 pub(super) fn steps(target: &Target, sheets: &[SheetLayout], paper: &PaperSpec) -> Vec<String> {
     let name = &target.name;
     let mut steps = vec![
-        "Print at 100 %, without \"fit to page\", on matt paper. Measure the lines of stated length on each sheet, \
-         across and along: if they are off, print again, or multiply all lengths by what you found."
+        "Print at 100 %, without \"fit to page\", on matt paper. Measure both check bars on each sheet. If a \
+         length is wrong, print again, or multiply all lengths by the ratio of measured to stated length."
             .to_owned(),
     ];
     match &target.spec {
@@ -19,20 +19,21 @@ pub(super) fn steps(target: &Target, sheets: &[SheetLayout], paper: &PaperSpec) 
     }
     match &target.spec {
         TargetSpec::Circles(_) => steps.push(format!(
-            "Keep {name}.json: target_mm says where every circle is, in the order in which OpenCV's findCirclesGrid finds them."
+            "Keep {name}.json: target_mm contains the position of every circle, in the order of OpenCV's findCirclesGrid."
         )),
         TargetSpec::Solid(SolidSpec { tags: None, .. }) => steps.push(format!(
-            "Keep {name}.json: target_mm says where every corner is. Without tags faces look alike: this finds their corners as \
-             grids, and which face a grid is must be told by other means before a camera can be made of it:\n\
+            "Keep {name}.json: target_mm contains the position of every corner. Faces without tags cannot be \
+             distinguished. This command detects a grid on each face; assign each grid to its face before \
+             calibration:\n\
              deltille detect photos --target {name}.json -o corners"
         )),
         _ => {
             steps.push(format!(
-                "Keep {name}.json: it says where every corner is. To find corners in photographs:\n\
+                "Keep {name}.json: it contains the position of every corner. To detect corners in photographs:\n\
                  deltille detect photos --target {name}.json -o corners"
             ));
             steps.push(format!(
-                "Ten photographs or more, near, tilted and to the rims, make a camera:\n\
+                "Take ten or more photographs, with the board close, tilted and near the image edges. To calibrate the camera:\n\
                  deltille calibrate corners --target {name}.json --model auto --report camera.html"
             ));
         }
@@ -43,23 +44,25 @@ pub(super) fn steps(target: &Target, sheets: &[SheetLayout], paper: &PaperSpec) 
 fn steps_of_board(target: &Target, sheets: &[SheetLayout]) -> Vec<String> {
     let mut steps = Vec::new();
     if sheets.iter().any(|sheet| !sheet.pages.is_empty()) {
-        let trim = "Trim pages along the line at their left and upper end, and lay them on the crosses of the pages that they name.";
+        let trim = "Trim each page along the lines at its left and upper edges. Align it with the crosses of the pages that are named on it.";
         steps.push(trim.to_owned());
     }
     if sheets.iter().any(|sheet| sheet.placements.len() > 1) {
-        steps.push("Cut the boards apart along the lines; each has a label of its own.".to_owned());
+        steps.push("Cut the boards apart along the lines; each has its own label.".to_owned());
     }
-    let flat = "Lay a straightedge on it: what bends by a millimetre is worth less than a smaller board that does not.";
+    let flat = "Check it with a straightedge: a smaller flat board is better than a larger one that bends by a millimetre.";
     steps.push(match &target.spec {
         TargetSpec::Board(BoardSpec { two_sided_mm: Some(mm), .. }) => format!(
-            "Cut both sides from mark to mark and glue them without bubbles on the two sides of a plate that stays flat and is as \
-             large, so that they are {} apart with their paper; or print them on the plate, turned about its upright edge. The \
-             marks of one side lie behind those of the other. {flat}",
+            "Cut both sheets from mark to mark. Glue them without bubbles to the two sides of a rigid, flat \
+             plate of the same size. The printed surfaces must be {} apart, including the paper. \
+             Alternatively, print both sides on the plate, and flip it about its vertical edge in between. The \
+             marks of both sides must coincide. {flat}",
             format_mm(*mm)
         ),
         _ => format!(
-            "Glue it without bubbles on a plate that stays flat: glass, aluminium composite or a stone tile, larger than the \
-             tiles by a fifth of an edge all around. {flat}"
+            "Glue it without bubbles to a rigid, flat plate, such as glass, aluminium composite or a stone \
+             tile. The plate must extend beyond the board's tiles by a fifth of a tile edge on every side. \
+             {flat}"
         ),
     });
     steps
@@ -71,11 +74,11 @@ fn steps_of_solid(spec: &SolidSpec, paper: &PaperSpec) -> Vec<String> {
         (SolidSheets::PerFace, skeleton) => {
             let onto = match skeleton {
                 Some(_) => {
-                    "Glue each panel on the seat of its number in the printed skeleton, its edges as numbered: edges of \
-                            the same number meet."
+                    "Glue each panel to the seat with its number in the printed skeleton. Edges with the same \
+                            number must meet."
                 }
                 None => {
-                    "Glue each face where the picture has its number, its edges as numbered: edges of the same number meet."
+                    "Glue each face at the position of its number in the picture. Edges with the same number must meet."
                 }
             };
             steps.push(
@@ -85,28 +88,28 @@ fn steps_of_solid(spec: &SolidSpec, paper: &PaperSpec) -> Vec<String> {
         }
         (_, skeleton) => {
             steps.push(
-                "Cut along lines that are drawn through. Score dashed lines and fold them away from the print; score dash-dotted \
-                 ones from behind and fold them towards it; leave dotted ones."
+                "Cut along solid lines. Score dashed lines and fold them away from the print. Score \
+                 dash-dotted lines on the back and fold them towards the print. Do not fold dotted lines."
                     .to_owned(),
             );
             steps.push(
-                "Glue tabs under the faces that they name: edges of the same number meet. Begin with one vertex and close \
-                 the solid last where it stands."
+                "Glue each tab under the face that it names. Edges with the same number must meet. Start at \
+                 one vertex, and close the solid last at the face on which it stands."
                     .to_owned(),
             );
             if skeleton.is_some() {
-                steps.push("Or cut the faces apart, and glue each on the seat of its number in the printed skeleton.".to_owned());
+                steps.push("Or cut the faces apart, and glue each to the seat with its number in the printed skeleton.".to_owned());
             }
         }
     }
     steps.push(
-        "Compare with the pictures: numbers run as printed, arrows show the upper end of each face."
+        "Compare with the pictures: face numbers have the same orientation as on the print, and arrows point to the top of each face."
             .to_owned(),
     );
-    let by_hand = "By hand faces come to lie within some tenths of a millimetre.";
+    let by_hand = "Faces glued by hand are accurate to a few tenths of a millimetre.";
     steps.push(match spec.tags {
         Some(_) => format!(
-            "{by_hand} With several cameras or many views, deltille rig --refine-target measures where they are."
+            "{by_hand} With several cameras or many views, deltille rig --refine-target estimates their poses."
         ),
         None => by_hand.to_owned(),
     });

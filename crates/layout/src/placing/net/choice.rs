@@ -23,7 +23,7 @@ pub(super) struct Net {
 /// A net whose pieces are placed on pages.
 pub(super) struct Nested {
     pub(super) net: Net,
-    /// Place of each piece.
+    /// Position of each piece.
     pub(super) places: Vec<Place>,
     pub(super) pages: usize,
 }

@@ -192,7 +192,8 @@ impl<'a> Drawing<'a> {
         Some(words([far_a, far_b], text, cap, 0.5, (tab.depth_mm - cap) / 2.0, room))
     }
 
-    /// Lays out a text in the margin of a face along one of its sides, centred at the fraction `part` of its length.
+    /// Lays out a line of text in the margin of a face along one of its sides, centred at the
+    /// fraction `part` of its length.
     fn margin_words(&self, ends: [DVec2; 2], text: Label, part: f64) -> SheetText {
         let margin = self.spec.white_margin_mm();
         let cap = (NUMBER_CAP.0 * margin).min(NUMBER_CAP.1);
@@ -226,7 +227,8 @@ impl<'a> Drawing<'a> {
     }
 }
 
-/// Lays out how to make the solid from a print of these lines, in two lines of text; the lower one starts at `at`.
+/// Lays out instructions for making the solid from a print of these lines, in two lines of text;
+/// the lower one starts at `at`.
 pub(super) fn instructions(lines: &[SheetLine], at: DVec2, room: f64) -> [SheetText; 2] {
     let has = |kind| lines.iter().any(|line| line.kind == kind);
     let mut folds = if has(LineKind::Valley) {
@@ -259,12 +261,13 @@ fn line(kind: LineKind, [from_mm, to_mm]: [DVec2; 2]) -> SheetLine {
     SheetLine { kind, from_mm, to_mm, width_mm: LINE_WIDTH_MM }
 }
 
-/// Estimates the width of a text, mm.
+/// Estimates the width of a line of text, mm.
 pub(super) fn width(text: &Label, cap: f64) -> f64 {
     text.characters() as f64 * ADVANCE_CAPS * cap
 }
 
-/// Lays out a text along the line between two points, centred at the fraction `part` of its length, with the baseline
+/// Lays out text along the line between two points, centred at the fraction `part` of its length,
+/// with the baseline
 /// `inwards` (to the left) of it.
 fn words(
     [from, to]: [DVec2; 2],

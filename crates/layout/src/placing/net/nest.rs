@@ -79,7 +79,8 @@ pub(super) fn fits(points: &[DVec2], rim: f64, room: DVec2) -> bool {
     })
 }
 
-/// Returns the rotations tried for a piece, starting with the one that minimizes its bounding box, all around.
+/// Returns the rotations tried for a piece, evenly spaced over 360°, starting with the one that
+/// minimises its bounding box.
 fn directions(points: &[DVec2]) -> [Motion; TURNS] {
     // The smallest box touches an edge of the convex hull; one degree is accurate enough.
     let size = |degrees: u32| {
@@ -212,7 +213,7 @@ impl Page {
             let mut rows = self.rows[y..].iter().zip(&stamp.rows);
             let beyond = rows.find_map(|(taken, runs)| {
                 runs.iter().find_map(|&[first, last]| {
-                    // A run that meets an occupied cell does so until it has passed it.
+                    // A run that overlaps an occupied cell is moved until it is past that cell.
                     Some(last_taken(taken, [x + first, x + last])? + 1 - first)
                 })
             });

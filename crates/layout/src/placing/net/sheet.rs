@@ -266,7 +266,7 @@ mod tests {
     use deltille_core::family::Family;
     use deltille_core::targets::{SolidShape, TargetSpec};
 
-    /// Estimated bounding rectangle of a text.
+    /// Estimated bounding rectangle of a line of text.
     fn text_box(text: &SheetText) -> [DVec2; 4] {
         let width = width(&text.text, text.cap_height_mm).min(text.max_width_mm);
         let (at, along) = (text.at_mm, DVec2::from_angle(text.angle_rad));

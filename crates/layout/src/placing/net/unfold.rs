@@ -91,7 +91,7 @@ impl Sides {
 /// Returns ways to unfold a solid, best first. Each is a list of pieces that together contain every face once. `flat`
 /// contains the outlines of the faces, each in its own frame, mm.
 ///
-/// A named solid has its usual nets, any other solid [`grown`] ones.
+/// A named solid has its usual nets; any other solid has [`grown`] ones.
 pub(super) fn unfoldings(
     solid: &Polyhedron,
     shape: &SolidShape,
@@ -185,7 +185,7 @@ fn area(pieces: &[Piece]) -> f64 {
     pieces.iter().map(area).sum()
 }
 
-/// Returns root and (parent, child) pairs of the usual nets of a named solid.
+/// Returns the root and the (parent, child) pairs of the usual nets of a named solid.
 fn usual_hinges(shape: &SolidShape) -> Vec<(usize, Vec<(usize, usize)>)> {
     match shape {
         // A large triangle around the base, or a strip.

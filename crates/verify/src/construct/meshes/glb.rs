@@ -116,7 +116,7 @@ impl<'a> Chunks<'a> {
             return Err("not glTF: no glTF header".to_owned());
         }
         if word(4) != Some(2) {
-            found.add("the head", "a version other than 2");
+            found.add("the header", "a version other than 2");
             return Ok(None);
         }
         let cut_off = || "not glTF: truncated".to_owned();

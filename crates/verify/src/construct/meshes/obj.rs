@@ -52,7 +52,7 @@ pub(in crate::construct) fn check(
     found.unless(
         named,
         &library_name,
-        "materials with other names than deltille writes, or in another order",
+        "materials whose names or order differ from those that deltille writes",
     );
     for texture in materials.into_iter().filter_map(|material| material.texture) {
         if found.refuse() {

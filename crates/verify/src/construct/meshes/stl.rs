@@ -24,7 +24,7 @@ pub(in crate::construct) fn check(
     limits.check_nodes(count).map_err(|exceeded| exceeded.to_string())?;
     let mut found = Findings::default();
     let head = bytes.get(..80).is_none_or(|head| head == header(name));
-    found.unless(head, "the head", "text other than the target's name");
+    found.unless(head, "the header", "text other than the target's name");
     let triangles = bytes.get(HEAD..).unwrap_or_default().chunks_exact(TRIANGLE);
     let coloured = triangles.enumerate().find(|(_, triangle)| triangle[GEOMETRY..] != [0, 0]);
     if let Some((index, _)) = coloured {

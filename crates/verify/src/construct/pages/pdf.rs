@@ -79,15 +79,19 @@ pub(in crate::construct) fn check(
 /// Checks that the file begins with the version and the binary mark.
 fn head(bytes: &[u8], found: &mut Findings) {
     let Some(rest) = bytes.strip_prefix(b"%PDF-") else {
-        return found.add("the head", "data before the PDF");
+        return found.add("the header", "data before the PDF");
     };
     if let Some(rest) = rest.strip_prefix(VERSION.as_bytes()) {
         let marked = rest.starts_with(BINARY_MARK);
-        return found.unless(marked, "the head", "bytes other than a version and the binary mark");
+        return found.unless(
+            marked,
+            "the header",
+            "bytes other than a version and the binary mark",
+        );
     }
     let version: Vec<u8> = rest.iter().copied().take(3).collect();
     let version = String::from_utf8_lossy(&version).into_owned();
-    found.add("the head", format!("version {version} instead of {VERSION}"));
+    found.add("the header", format!("version {version} instead of {VERSION}"));
 }
 
 /// Checks that every object begins at its offset in the cross-reference table. Otherwise readers that rebuild the
@@ -319,7 +323,7 @@ impl<'a> Inspection<'a> {
             return Ok(());
         };
         let count = self.value(root, "Count").and_then(|count| count.as_i64().ok());
-        self.found.unless(count == Some(kids.len() as i64), place, "a wrong count of pages");
+        self.found.unless(count == Some(kids.len() as i64), place, "a wrong page count");
         let mut seen = BTreeSet::new();
         for (index, kid) in kids.iter().enumerate() {
             let place = format!("page {}", index + 1);

@@ -66,7 +66,7 @@ pub(in crate::construct) fn check(
     let document = match Document::parse_with_options(text, options) {
         Ok(document) => document,
         Err(Error::DtdDetected) => {
-            found.add("the head", "a document type declaration");
+            found.add("the header", "a document type declaration");
             return Ok(found);
         }
         Err(Error::NodesLimitReached) => return Err(limits.exceeded(Kind::Nodes).to_string()),
@@ -117,7 +117,7 @@ pub(in crate::construct) fn check(
 /// Checks that the file begins with the declaration of XML 1.0 in UTF-8.
 fn head(text: &str, found: &mut Findings) {
     if text.starts_with('\u{feff}') {
-        return found.add("the head", "a byte order mark");
+        return found.add("the header", "a byte order mark");
     }
     if !text.starts_with(DECLARATION) {
         let line = start(text.lines().next().unwrap_or_default(), 60);

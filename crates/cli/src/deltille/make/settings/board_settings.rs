@@ -59,8 +59,8 @@ pub struct BoardSettings {
     /// has its own border, for detectors that need complete tags, such as AprilTag's) [default: black]
     #[arg(long, help_heading = TAGS, value_name = "COLOUR", value_parser = colour)]
     tags_in: Option<TagsIn>,
-    /// Put a small position code in every upright tile of a deltille board: any 3 × 4 adjacent tiles identify their
-    /// position and which of 255 boards it is
+    /// Put a small position code in every upright tile of a deltille board: any 3 × 4 adjacent
+    /// tiles identify the board (one of 255) and their position on it
     #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tag_spacing", "first_id", "untagged"])]
     #[serde(skip_serializing_if = "is_false")]
     dense: bool,
@@ -94,7 +94,7 @@ pub struct BoardSettings {
     /// [default: 1]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MAX_ROWS))]
     boards: Option<u32>,
-    /// Exchange black and white: white tiles on black
+    /// Swap black and white: white tiles on black
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     invert: bool,

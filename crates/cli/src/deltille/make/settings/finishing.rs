@@ -23,12 +23,12 @@ pub struct Finishing {
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     mirrored: bool,
-    /// Print white under each page of the PDF in a spot colour of this name, such as White or RDG_WHITE, with
-    /// everything else overprinted
+    /// Print white under each page of the PDF in a spot colour of this name, such as White or
+    /// RDG_WHITE, and overprint everything else on it
     #[arg(long, value_name = "NAME")]
     white: Option<String>,
-    /// Cut line along the middle of the margin, or between boards that share a sheet; in the PDF, in the spot colour
-    /// <NAME>, such as CutContour
+    /// Print a cut line along the middle of the margin, or between boards that share a sheet; the
+    /// PDF uses the spot colour <NAME>, such as CutContour
     #[arg(long, value_name = "NAME")]
     contour: Option<String>,
 }

@@ -62,16 +62,16 @@ pub struct Meshes {
     #[arg(long = "3mf")]
     #[serde(rename = "3mf", skip_serializing_if = "is_false")]
     threemf: bool,
-    /// Depth of the black inlay in a 3MF; less than the plate thickness or, in a solid, than the depth at which inlays
-    /// of adjacent faces would meet [default: 0.4mm]
+    /// Depth of the black inlay in a 3MF; must be less than the plate thickness or, in a solid,
+    /// less than the depth at which inlays of adjacent faces would meet [default: 0.4mm]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     inlay: Option<String>,
     /// Longest side of the texture in px; at least 4 px per tag cell, 12 px on checkerboards [default: 20 px per
     /// cell, limited to 16384 px]
     #[arg(long, value_name = "PX", allow_negative_numbers = true, value_parser = whole(SIDE_PX))]
     texture: Option<u32>,
-    /// Distribute the faces over N textures, each of the size given by --texture, for more detail; without --texture,
-    /// for smaller files [default: 1]
+    /// Distribute the faces over N textures. With --texture, each has that size, for more detail;
+    /// otherwise, the files are smaller [default: 1]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
           value_parser = whole(1..=MAX_TEXTURES))]
     textures: Option<u32>,

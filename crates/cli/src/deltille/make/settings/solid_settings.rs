@@ -22,7 +22,7 @@ use deltille::targets::{
 };
 
 /// Help heading of bodies and outlines.
-const BODIES: &str = "Bodies to 3D-print, outlines to cut";
+const BODIES: &str = "3D printing and cutting";
 
 /// Settings as given; those that are not given have defaults.
 #[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, Deserialize)]
@@ -59,8 +59,8 @@ pub struct SolidSettings {
     /// Tag family: a name from `deltag list`, or a family file [default: delTag25h7]
     #[arg(long, help_heading = TAGS)]
     pub family: Option<String>,
-    /// Put a small position code in every upright tile: any 3 × 4 adjacent tiles identify their position and which of
-    /// 255 boards it is, one per face
+    /// Put a small position code in every upright tile: any 3 × 4 adjacent tiles identify the board
+    /// (one of 255, one per face) and their position on it
     #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tag_spacing", "first_id"])]
     #[serde(skip_serializing_if = "is_false")]
     pub dense: bool,
@@ -107,11 +107,12 @@ pub struct SolidSettings {
     /// Thickness of the skeleton below the panels [default: 4mm]
     #[arg(long, help_heading = BODIES, value_name = "LENGTH", allow_hyphen_values = true)]
     pub wall: Option<String>,
-    /// Distance of the seats from the edges of the faces [default: the smallest that stays solid]
+    /// Distance of the seats from the edges of the faces [default: the smallest at which the ribs
+    /// have a base]
     #[arg(long, help_heading = BODIES, value_name = "LENGTH", allow_hyphen_values = true)]
     pub rib: Option<String>,
-    /// Write <name>-panels.dxf, outlines to cut of all faces or, with --skeleton, of its panels; without --per-face
-    /// also <name>-net.dxf, the net to cut, score and fold (millimetres)
+    /// Write <name>-panels.dxf, the cut outlines of all faces or, with --skeleton, of its panels;
+    /// without --per-face, also write <name>-net.dxf, the net to cut, score and fold (millimetres)
     #[arg(long, help_heading = BODIES)]
     #[serde(skip_serializing_if = "is_false")]
     pub dxf: bool,
@@ -149,9 +150,9 @@ pub struct SolidSettings {
     /// Resolution of the PNG pages, dots per inch [default: 300]
     #[arg(long, help_heading = PRINT, value_parser = whole(200..=2400u32))]
     pub dpi: Option<u32>,
-    /// The paper; a larger net is printed in several pieces of whole faces.
+    /// The paper; a larger net is split between faces into several pieces.
     #[arg(long, help_heading = PAPER, value_name = "SIZE", help = format!(
-        "{}; a larger net is printed in several pieces of whole faces [default: the smallest of A4 to A0 that fits it, \
+        "{}; a larger net is split between faces into several pieces [default: the smallest of A4 to A0 that fits it, \
          otherwise A0]",
         PaperSize::choice()
     ))]

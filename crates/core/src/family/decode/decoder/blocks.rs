@@ -4,7 +4,8 @@ use crate::family::{Family, TagWords, ball};
 
 /// Tables of a family's words in all rotations, by blocks of their bits.
 ///
-/// A word within e errors of a code agrees with it in some block up to ⌊e / blocks⌋ errors. So for each block, only
+/// If a word is within e errors of a code, at least one block contains at most ⌊e / blocks⌋ errors.
+/// So for each block, only
 /// codes whose block is that close to the word's are compared; they are adjacent in memory. For these, 32 bits
 /// outside the block are compared first, many at a time.
 #[derive(Clone, Debug)]
@@ -116,8 +117,8 @@ impl Block {
         (word >> self.shift) as usize & ((1 << self.width) - 1)
     }
 
-    /// Returns the bits after the block, continuing with the lowest ones; drops the uppermost if there are more than
-    /// 32.
+    /// Returns the bits above the block, then those below it, starting with the lowest; drops the
+    /// highest if there are more than 32.
     #[inline]
     fn tail(&self, bits: u32, word: u64) -> u32 {
         let end = self.shift + self.width;

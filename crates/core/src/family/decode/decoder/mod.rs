@@ -90,7 +90,8 @@ impl Decoder {
 
     /// Returns the closest code within `max_errors` cells of `word`, if any.
     ///
-    /// Up to ⌊(h−1)/2⌋ errors the answer is unique. Beyond, every code is compared; ties go to the lower id, then to
+    /// Up to ⌊(h−1)/2⌋ errors the answer is unique. Beyond that, every code is compared; ties go to
+    /// the lower id, then to
     /// fewer rotations, and appear in `runner_up`.
     #[inline]
     pub fn decode(&self, word: u64, max_errors: u32) -> Option<Decoded> {

@@ -8,8 +8,9 @@ use crate::family::{Construction, Family, TagWords, ball};
 /// error patterns, gives the intended word of the union. A second lookup, by its smallest rotation, shows whether the
 /// family contains it. The time does not depend on the number of codes.
 ///
-/// The code is invariant under a rotation of the tag, so rotating errors is a linear map of their syndrome. The table
-/// contains one of three rotated patterns, that with the smallest syndrome, which makes it a third as large.
+/// The code is invariant under a rotation of the tag, so rotating errors is a linear map of their syndrome.
+/// Of three rotated patterns, the table contains only the one with the smallest syndrome. This
+/// makes the table a third as large.
 #[derive(Clone, Debug)]
 pub(super) struct Syndromes {
     words: TagWords,
@@ -35,8 +36,8 @@ impl Syndromes {
     pub(super) fn cost(family: &Family) -> f64 {
         /// Cost of a table lookup, in comparisons of adjacent words (measured).
         const LOOK_COST: f64 = 30.0;
-        /// Number of words that share the cost of making the table, about a comparison for each pattern: those of
-        /// some hundred images.
+        /// Number of words that share the cost of making the table, about one comparison for each
+        /// pattern: the words of about a hundred images.
         const WORDS: f64 = 10_000.0;
         match family.construction() {
             Construction::Algebraic(c) if c.exchanged.is_empty() => {
@@ -160,7 +161,8 @@ impl PatternTable {
                 }))
     }
 
-    /// Inserts a pattern whose syndrome is the smallest of its rotations; returns false if another one has it.
+    /// Inserts a pattern whose syndrome is the smallest of its rotations; returns false if another
+    /// pattern has this syndrome.
     fn insert(&mut self, pattern: u64, [syndrome, once, twice]: [u32; 3]) -> bool {
         if once < syndrome || twice < syndrome {
             return true;

@@ -279,8 +279,8 @@ impl<'a> Block<'a> {
         let unit = known.iter().find(|(r, _)| (ratio / r - 1.0).abs() < UNIT_SLACK);
         let (_, [edge, unit]) = unit.ok_or_else(|| {
             let problem = format!(
-                "board {}: the size is {}, but neighbouring corners are {step} apart; no units of \
-                 length explain this",
+                "board {}: the size is {}, but neighbouring corners are {step} apart; no pair of length units \
+                 explains this ratio",
                 self.id, self.size
             );
             self.head.fault(problem)

@@ -98,7 +98,7 @@ pub enum TableError {
     )]
     Other(&'static str),
     /// The table has another version.
-    #[error("its schema is `{found}`, but this version reads `{reads}`: make the file again")]
+    #[error("its schema is `{found}`, but this version reads `{reads}`: create the file again")]
     Schema {
         /// The schema that the file names.
         found: String,

@@ -43,11 +43,11 @@ pub(super) fn unpacked_bytes(mut chunk: &[u8], most_entries: u64) -> Result<u64,
         }
         // Every value of a dictionary takes at least one byte.
         if header.is_dictionary && size(header.values)? > unpacked.min(most_entries) {
-            return Err("a dictionary states more values than it has".to_owned());
+            return Err("a dictionary contains fewer values than it states".to_owned());
         }
         all += unpacked;
         let rest = usize::try_from(packed).ok().and_then(|packed| chunk.get(packed..));
-        chunk = rest.ok_or("a page ends too soon")?;
+        chunk = rest.ok_or("a page is truncated")?;
     }
     Ok(all)
 }

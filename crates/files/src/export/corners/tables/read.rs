@@ -453,7 +453,7 @@ impl Stream {
         };
         cells.map_err(|error| match error {
             Some(error) => damaged(error),
-            None => TableError::File(format!("column {} ends too soon", self.column.name)),
+            None => TableError::File(format!("column {} is truncated", self.column.name)),
         })
     }
 }
