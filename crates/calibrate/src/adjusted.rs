@@ -7,9 +7,9 @@ use super::estimate::values::{CameraEstimate, Estimate};
 use super::excluded::{Excluded, Reason};
 use super::input::calibration::{Calibration, CameraViews, Intrinsics};
 use super::problem::panels;
-use super::start::alone::{self, enough};
 use super::start::frames::{Frame, Start};
-use super::start::together::{self, Alone};
+use super::start::rig::{self, Alone};
+use super::start::single_camera::{self, enough};
 use deltille_core::camera::PROJECTION_PARAMETERS;
 
 /// Largest standard deviation of focal lengths and principal point, as a fraction of the focal
@@ -143,8 +143,8 @@ impl Calibration {
 /// Returns an error if no initial values are found, or the views do not determine the unknowns.
 fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
     match calibration.is_single() {
-        true => alone::start(calibration),
-        false => together::start(calibration, by_itself),
+        true => single_camera::start(calibration),
+        false => rig::start(calibration, by_itself),
     }
 }
 

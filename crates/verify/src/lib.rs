@@ -5,7 +5,7 @@
 //! [`Finding`]. Data passes through the folders in this order:
 //!
 //! 1. `reading` reads bytes from memory or disk, within limits; `by_format` selects the comparison for the format.
-//! 2. `construct` rejects constructs that viewers may render differently.
+//! 2. `syntax` rejects constructs that viewers may render differently.
 //! 3. `document` renders pages and `model` loads meshes, both with third-party code.
 //! 4. `panel` compares one board on a page, `sheet` a whole sheet of paper, `net` the solid folded from it.
 //! 5. `mesh` compares textured meshes, `body` bodies for 3D printing, `cut` drawings for cutters.
@@ -67,7 +67,6 @@
 
 mod body;
 mod by_format;
-mod construct;
 mod cut;
 mod document;
 mod error;
@@ -81,6 +80,7 @@ mod printed;
 mod printed_files;
 mod reading;
 mod sheet;
+mod syntax;
 mod verdict;
 mod verifier;
 

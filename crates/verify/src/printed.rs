@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-use crate::construct::{findings, inspect};
 use crate::document::drawing;
 use crate::document::opened::Document;
 use crate::error::VerifyError;
@@ -17,6 +16,7 @@ use crate::reading::reader::Reader;
 use crate::sheet::boards::Seen;
 use crate::sheet::source::{Source, wish_px_per_mm};
 use crate::sheet::{assemble, marks, whole};
+use crate::syntax::{findings, inspect};
 use crate::verdict::{SheetVerdict, Verdict};
 use crate::verifier::Verifier;
 use deltille_layout::SheetPage;

@@ -35,7 +35,7 @@ const MAX_LEFT: f64 = 0.25;
 
 /// Minimum displacement at the edge of the image that counts as a change, in standard deviations of
 /// a corner: the limit of an outlier. Smaller changes, such as those of a lens that warms up, are
-/// covered by the uncertainties, see [`crate::uncertainty::halves`].
+/// covered by the uncertainties, see [`crate::uncertainty::split_halves`].
 const MIN_CHANGE: f64 = OUTLIER_SIGMA;
 
 /// Minimum stretch that implies another board or a print scaled to its page: printers feed paper

@@ -26,9 +26,9 @@ use crate::problem::whitening::deviations;
 use crate::start::frames::Frame;
 use crate::uncertainty::agreement::{Observed, observed};
 use crate::uncertainty::board_errors::{board_errors, drawn_to_plan};
-use crate::uncertainty::halves;
-use crate::uncertainty::known_so_far::known_so_far;
+use crate::uncertainty::information::known_so_far;
 use crate::uncertainty::projection::{ObservedCovariance, ProjectionUncertainty};
+use crate::uncertainty::split_halves;
 use crate::uncertainty::state_equations::StateEquations;
 use deltille_core::camera::PROJECTION_PARAMETERS;
 
@@ -261,9 +261,12 @@ fn projection(
         let own =
             |of: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, j| of[(columns[i].1, columns[j].1)]);
         let covariance = match state {
-            Some(state) => {
-                halves::raised(state, &camera.camera, own(covariance), camera.covariance.inner())
-            }
+            Some(state) => split_halves::raised(
+                state,
+                &camera.camera,
+                own(covariance),
+                camera.covariance.inner(),
+            ),
             None => own(covariance),
         };
         let of_board = of_board.as_ref().map(|of| Matrix::new(own(of)));

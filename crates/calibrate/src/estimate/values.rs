@@ -17,7 +17,7 @@ use crate::model::Model;
 use crate::problem::roughness::Roughness;
 use crate::problem::shape::BoardShape;
 use crate::start::symmetry::LabelRotation;
-use crate::uncertainty::known_so_far::KnownSoFar;
+use crate::uncertainty::information::KnownSoFar;
 use crate::uncertainty::projection::ProjectionUncertainty;
 use crate::uncertainty::state_equations::StateEquations;
 use deltille_core::camera::{Camera, Pose};

@@ -21,7 +21,7 @@ use crate::estimate::values::{CameraEstimate, Estimate};
 use crate::model::Model;
 use crate::problem::shape;
 use crate::problem::shape::Shape;
-use crate::uncertainty::known_so_far::KnownSoFar;
+use crate::uncertainty::information::KnownSoFar;
 use crate::uncertainty::projection::{by_motion, by_parameters, seen_at, solved};
 use deltille_core::camera::{Camera, PROJECTION_PARAMETERS};
 

@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use super::linked::{ByFrame, Seen};
+use super::relative_poses::{ByFrame, Seen};
 use super::symmetry::{Symmetries, agreed};
 use crate::input::calibration::Calibration;
 use crate::input::sample::evenly;

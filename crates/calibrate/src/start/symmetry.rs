@@ -21,7 +21,7 @@ use std::f64::consts::FRAC_PI_4;
 
 use glam::{DQuat, DVec3};
 
-use super::linked::{ByFrame, MIN_SHARED, Seen};
+use super::relative_poses::{ByFrame, MIN_SHARED, Seen};
 use crate::input::calibration::Calibration;
 use crate::input::observation::Observation;
 use crate::input::sample::evenly;

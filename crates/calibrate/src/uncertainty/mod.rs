@@ -6,13 +6,13 @@
 //!    board.
 //! 2. `state_equations` forms equations of each view for changes of the camera, a rolling shutter and a stretched
 //!    board.
-//! 3. `halves` increases the covariance if two halves of the views differ by more than it predicts.
-//! 4. `projection` is the uncertainty of projections; `known_so_far` is the information on which
+//! 3. `split_halves` increases the covariance if two halves of the views differ by more than it predicts.
+//! 4. `projection` is the uncertainty of projections; `information` is the information on which
 //!    proposals of views are based.
 
 pub(crate) mod agreement;
 pub(crate) mod board_errors;
-pub(crate) mod halves;
-pub(crate) mod known_so_far;
+pub(crate) mod information;
 pub(crate) mod projection;
+pub(crate) mod split_halves;
 pub(crate) mod state_equations;

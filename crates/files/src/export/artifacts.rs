@@ -15,7 +15,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use crate::export::corners::dsc::{self, Dialect, DscError};
+use crate::export::detections::dsc::{self, Dialect, DscError};
 use crate::export::meshes::inlay::InlaidBodies;
 use crate::export::meshes::mesh::{MeshError, Meshing, TexturedMesh};
 use crate::export::meshes::{gltf, obj, scene, stl, threemf};

@@ -1,7 +1,7 @@
 //! Artwork, targets and results to files and back, one module for each format.
 //!
 //! In the order of their use: `pages` (artwork as PDF, SVG, PNG, and drawings for cutters), `meshes` (targets in space),
-//! `corners` (detections, lists of boards), `cameras` (calibrations and their applications). `writing` writes files to disk, and
+//! `detections` (lists of boards), `cameras` (calibrations and their applications). `writing` writes files to disk, and
 //! [`artifacts`] makes all files of a target.
 //!
 //! Writers of artwork take shapes in millimetres and only convert units and syntax; writers of targets and results return text.
@@ -11,7 +11,7 @@
 #[cfg(all(feature = "meshes", feature = "print"))]
 pub mod artifacts;
 mod cameras;
-mod corners;
+mod detections;
 mod meshes;
 pub mod named;
 mod pages;
@@ -23,12 +23,12 @@ pub use cameras::format::{
 pub use cameras::{
     calibration, camera, comparison, next_view, pose, rig, saved, sheet, truth, undistortion,
 };
-pub use corners::format::{DETECTION_FORMATS, DetectionFormat};
+pub use detections::format::{DETECTION_FORMATS, DetectionFormat};
 #[cfg(feature = "overlay")]
-pub use corners::overlay;
+pub use detections::overlay;
 #[cfg(feature = "parquet")]
-pub use corners::tables;
-pub use corners::{csv, detection, dsc, npy, orpc, tp};
+pub use detections::tables;
+pub use detections::{csv, detection, dsc, npy, orpc, tp};
 pub use meshes::stl;
 #[cfg(feature = "meshes")]
 pub use meshes::{gltf, inlay, mesh, obj, scene, solid_mesh, texture, threemf};

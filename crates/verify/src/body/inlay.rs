@@ -14,7 +14,6 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use crate::body::shape;
-use crate::construct::inspect;
 use crate::document::page::Page;
 use crate::finding::any::Finding;
 use crate::finding::mesh::MeshFinding;
@@ -26,6 +25,7 @@ use crate::reading::names::file_name;
 use crate::reading::reader::Reader;
 use crate::sheet::face_picture::FacePicture;
 use crate::sheet::whole;
+use crate::syntax::inspect;
 use crate::verdict::{InlayVerdict, SheetVerdict, Verdict};
 use crate::verifier::Verifier;
 use deltille_core::polygon;

@@ -21,7 +21,6 @@ use rayon::prelude::*;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
-use crate::construct::{findings, inspect};
 use crate::finding::any::Finding;
 use crate::finding::mesh::MeshFinding;
 use crate::mesh::measures::{MESH_TOLERANCE_MM, is_other_mesh, other_count, volume};
@@ -29,6 +28,7 @@ use crate::model::stl::{Facet, load_stl};
 use crate::reading::error::DocumentError;
 use crate::reading::format::Format;
 use crate::reading::reader::Reader;
+use crate::syntax::{findings, inspect};
 use crate::verdict::{BodyVerdict, Verdict};
 use crate::verifier::Verifier;
 use deltille_core::targets::{

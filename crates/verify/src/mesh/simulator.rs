@@ -3,12 +3,12 @@
 
 use std::path::Path;
 
-use crate::construct::{findings, inspect};
 use crate::mesh::textured;
 use crate::reading::error::DocumentError;
 use crate::reading::format::Format;
 use crate::reading::names::file_name;
 use crate::reading::reader::Reader;
+use crate::syntax::{findings, inspect};
 use crate::verdict::Verdict;
 use crate::verifier::Verifier;
 

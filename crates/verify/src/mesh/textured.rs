@@ -6,7 +6,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::DVec2;
 use rayon::prelude::*;
 
-use crate::construct::{findings, inspect};
 use crate::finding::board::BoardFinding;
 use crate::finding::mesh::MeshFinding;
 use crate::mesh::face::check_face;
@@ -18,6 +17,7 @@ use crate::model::mesh::Model;
 use crate::reading::error::DocumentError;
 use crate::reading::format::Format;
 use crate::reading::reader::Reader;
+use crate::syntax::{findings, inspect};
 use crate::verdict::Verdict;
 use crate::verifier::Verifier;
 use deltille_core::targets::TargetSpec;

@@ -2,9 +2,9 @@
 //! the lists of a `.usda`.
 //!
 //! All formats return positions in millimetres, and texture coordinates with the origin in the upper left corner. The
-//! files have already been inspected, see [`construct`], so every viewer interprets them as the code here does.
+//! files have already been inspected, see [`syntax`], so every viewer interprets them as the code here does.
 //!
-//! [`construct`]: crate::construct
+//! [`syntax`]: crate::syntax
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Cursor;
@@ -13,11 +13,11 @@ use std::path::Path;
 use glam::{DMat4, DVec2, DVec3, Vec2, Vec3};
 use image::ImageDecoder as _;
 
-use crate::construct::meshes::usda::list;
 use crate::model::mesh::{Model, Triangle};
 use crate::reading::error::DocumentError;
 use crate::reading::format::Format;
 use crate::reading::reader::{Artifact, Reader};
+use crate::syntax::meshes::usda::list;
 use deltille_core::raster::Gray;
 use deltille_files::export::scene::USD_SUBSET;
 use deltille_files::limits::Limits;

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::motion::Motion;
 #[cfg(feature = "print")]
-use crate::export::corners::overlay::{self, Outlined, OverlayError};
+use crate::export::detections::overlay::{self, Outlined, OverlayError};
 #[cfg(feature = "print")]
 use crate::export::pages::svg::HEAD;
 use deltille_calibrate::NextView;

@@ -7,7 +7,7 @@ use glam::DMat3;
 use serde::Serialize;
 
 use crate::export::GENERATOR;
-use crate::export::corners::npy;
+use crate::export::detections::npy;
 use deltille_core::camera::{PixelMap, Rectification, Undistortion};
 use deltille_core::json;
 

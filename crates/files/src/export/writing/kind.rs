@@ -12,7 +12,7 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
-use crate::export::corners::dsc;
+use crate::export::detections::dsc;
 use deltille_core::json;
 use deltille_core::words::cut;
 
@@ -70,7 +70,7 @@ impl Kind {
             let Png { software, is_to_scale } = Png::of(content);
             let is_own = software.is_some_and(|by| by.starts_with(b"deltille "));
             signed(if is_to_scale && is_own { "PNG to scale" } else { "PNG" }, is_own)
-        } else if content.starts_with(crate::export::corners::npy::MAGIC) {
+        } else if content.starts_with(crate::export::detections::npy::MAGIC) {
             Self::words("an array of NumPy")
         } else if content.starts_with(PARQUET) {
             // The file ends with its metadata, which end with the name of the writer.

@@ -6,10 +6,10 @@ use std::collections::BTreeSet;
 use glam::{DMat4, DQuat, DVec3};
 use serde_json::Value;
 
-use crate::construct::findings::Findings;
-use crate::construct::meshes::glb_json::{Accessor, Node, Primitive, Root, Sampler, Surface};
-use crate::construct::png;
-use crate::construct::words::{Words, is_creator};
+use crate::syntax::findings::Findings;
+use crate::syntax::meshes::glb_json::{Accessor, Node, Primitive, Root, Sampler, Surface};
+use crate::syntax::png;
+use crate::syntax::words::{Words, is_creator};
 use deltille_core::reading::in_words;
 use deltille_files::export::gltf::{
     ARRAY_BUFFER, CLAMP_TO_EDGE, ELEMENT_ARRAY_BUFFER, FLOAT, LINEAR, LINEAR_MIPMAP_LINEAR,
@@ -31,7 +31,7 @@ const SLACK: f64 = 1e-5;
 /// # Errors
 ///
 /// Returns an error if the file is not glTF, is truncated, or exceeds the limits.
-pub(in crate::construct) fn check(
+pub(in crate::syntax) fn check(
     bytes: &[u8],
     words: &Words,
     limits: &Limits,

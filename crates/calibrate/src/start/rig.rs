@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::delay::{delays, in_time};
 use super::frames::{Frame, Start};
-use super::linked::{ByFrame, Places, Seen};
+use super::relative_poses::{ByFrame, Places, Seen};
 use super::symmetry::Symmetries;
 use crate::equations::minimise::{Until, minimise};
 use crate::error::CalibrationError;

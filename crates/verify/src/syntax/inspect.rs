@@ -2,16 +2,16 @@
 
 use std::path::Path;
 
-use crate::construct::findings::Findings;
-use crate::construct::meshes::{glb, obj, stl, threemf, usda};
-use crate::construct::pages::{pdf, svg};
-use crate::construct::png;
-use crate::construct::text::text;
-use crate::construct::words::Words;
 use crate::finding::any::Finding;
 use crate::reading::error::DocumentError;
 use crate::reading::format::Format;
 use crate::reading::reader::{Artifact, Reader};
+use crate::syntax::findings::Findings;
+use crate::syntax::meshes::{glb, obj, stl, threemf, usda};
+use crate::syntax::pages::{pdf, svg};
+use crate::syntax::png;
+use crate::syntax::text::text;
+use crate::syntax::words::Words;
 use deltille_files::export::inlay::Body;
 use deltille_files::export::scene;
 use deltille_layout::Printing;

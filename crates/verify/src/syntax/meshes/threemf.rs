@@ -3,11 +3,11 @@
 use flate2::{Crc, Decompress};
 use glam::DVec3;
 
-use crate::construct::findings::Findings;
-use crate::construct::meshes::usda::same_lines;
-use crate::construct::text::{decimal, text};
-use crate::construct::words::Words;
-use crate::construct::zlib::unpack_by;
+use crate::syntax::findings::Findings;
+use crate::syntax::meshes::usda::same_lines;
+use crate::syntax::text::{decimal, text};
+use crate::syntax::words::Words;
+use crate::syntax::zlib::unpack_by;
 use deltille_files::export::inlay::Body;
 use deltille_files::export::threemf::{MODEL, TURN, fixed_parts, frame};
 use deltille_files::limits::{Kind, Limits};
@@ -24,7 +24,7 @@ const HEADER: usize = 30;
 /// # Errors
 ///
 /// Returns an error if the file is not a ZIP, is damaged, refers to missing vertices, or exceeds the limits.
-pub(in crate::construct) fn check(
+pub(in crate::syntax) fn check(
     file: &[u8],
     names: &[&str],
     words: &Words,

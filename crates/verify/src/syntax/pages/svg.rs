@@ -5,10 +5,10 @@ use glam::DVec2;
 use kurbo::BezPath;
 use resvg::usvg::roxmltree::{Document, Error, Node, NodeType, ParsingOptions};
 
-use crate::construct::findings::Findings;
-use crate::construct::pages::ink::{Ink, OFF_PAGE};
-use crate::construct::text::{decimal, start, text};
-use crate::construct::words::{Words, is_creator};
+use crate::syntax::findings::Findings;
+use crate::syntax::pages::ink::{Ink, OFF_PAGE};
+use crate::syntax::text::{decimal, start, text};
+use crate::syntax::words::{Words, is_creator};
 use deltille_files::limits::{Kind, Limits};
 
 /// The XML namespace of SVG.
@@ -44,7 +44,7 @@ const MAX_ATTRIBUTES: usize = 1000;
 /// # Errors
 ///
 /// Returns an error if the file is not a readable SVG or exceeds the limits.
-pub(in crate::construct) fn check(
+pub(in crate::syntax) fn check(
     bytes: &[u8],
     words: &Words,
     limits: &Limits,

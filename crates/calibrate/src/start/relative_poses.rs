@@ -9,8 +9,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::motion::{Moment, placed_by_motion};
 use super::pose::middle;
+use super::rig_motion::{Moment, placed_by_motion};
 use crate::error::{CalibrationError, DegenerateMotion};
 use crate::input::calibration::Calibration;
 use deltille_core::camera::Pose;

@@ -1,7 +1,7 @@
 //! Inspection of binary STL for what every reader interprets the same way: the header that the program writes, and
 //! triangles without attributes, which some readers interpret as colours.
 
-use crate::construct::findings::Findings;
+use crate::syntax::findings::Findings;
 use deltille_files::export::stl::header;
 use deltille_files::limits::Limits;
 
@@ -15,7 +15,7 @@ const GEOMETRY: usize = 48;
 /// # Errors
 ///
 /// Returns an error if there are more triangles than the limits allow.
-pub(in crate::construct) fn check(
+pub(in crate::syntax) fn check(
     bytes: &[u8],
     name: &str,
     limits: &Limits,

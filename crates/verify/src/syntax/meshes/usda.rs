@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use crate::construct::findings::Findings;
-use crate::construct::png;
-use crate::construct::text::{decimal, text};
-use crate::construct::words::Words;
 use crate::reading::error::DocumentError;
 use crate::reading::reader::{Artifact, Reader};
+use crate::syntax::findings::Findings;
+use crate::syntax::png;
+use crate::syntax::text::{decimal, text};
+use crate::syntax::words::Words;
 use deltille_files::export::obj::texture_name;
 use deltille_files::export::scene::{USD_LISTS, USD_SUBSET, usda_frame};
 use deltille_files::export::texture::MAX_TEXTURES;
@@ -17,7 +17,7 @@ use deltille_files::export::texture::MAX_TEXTURES;
 /// # Errors
 ///
 /// Returns an error if a file cannot be read, is not text or not a PNG, or exceeds the limits.
-pub(in crate::construct) fn check(
+pub(in crate::syntax) fn check(
     reader: &Reader,
     path: &Path,
     bytes: &[u8],
@@ -45,14 +45,14 @@ pub(in crate::construct) fn check(
 
 /// Returns the number of textures of a file from its lines that begin with `start`: with several textures, each has
 /// such a line.
-pub(in crate::construct) fn textures_by(text: &str, start: &str) -> usize {
+pub(in crate::syntax) fn textures_by(text: &str, start: &str) -> usize {
     let lines = text.lines().filter(|line| line.trim_start().starts_with(start));
     lines.count().clamp(1, MAX_TEXTURES as usize)
 }
 
 /// Adds the first line that differs from `stated`, after `plain` was applied to both. The versions of the program
 /// that wrote them may differ.
-pub(in crate::construct) fn same_lines(
+pub(in crate::syntax) fn same_lines(
     text: &str,
     stated: &str,
     plain: impl Fn(&str) -> String,

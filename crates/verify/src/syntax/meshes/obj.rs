@@ -6,13 +6,13 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::construct::findings::Findings;
-use crate::construct::meshes::mtl;
-use crate::construct::png;
-use crate::construct::text::{decimal, is_plain_file_name, start, text};
-use crate::construct::words::{Words, is_creator};
 use crate::reading::error::DocumentError;
 use crate::reading::reader::{Artifact, Reader};
+use crate::syntax::findings::Findings;
+use crate::syntax::meshes::mtl;
+use crate::syntax::png;
+use crate::syntax::text::{decimal, is_plain_file_name, start, text};
+use crate::syntax::words::{Words, is_creator};
 use deltille_files::export::obj::{material_name, part_name, texture_name};
 use deltille_files::export::texture::MAX_TEXTURES;
 
@@ -22,7 +22,7 @@ use deltille_files::export::texture::MAX_TEXTURES;
 /// # Errors
 ///
 /// Returns an error if a file cannot be read, is not text or not a PNG, or exceeds the limits.
-pub(in crate::construct) fn check(
+pub(in crate::syntax) fn check(
     reader: &Reader,
     path: &Path,
     bytes: &[u8],
@@ -74,7 +74,7 @@ pub(in crate::construct) fn check(
 /// # Errors
 ///
 /// Returns an error if a file cannot be read or is not text.
-pub(in crate::construct) fn check_parts(
+pub(in crate::syntax) fn check_parts(
     reader: &Reader,
     path: &Path,
     count: usize,

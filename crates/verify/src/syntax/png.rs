@@ -1,9 +1,9 @@
 //! The PNG chunks and pixels that every viewer shows the same way: 8-bit grey without transparency, without a colour
 //! space to interpret and without a second image.
 
-use crate::construct::findings::Findings;
-use crate::construct::words::is_creator;
-use crate::construct::zlib::unpack;
+use crate::syntax::findings::Findings;
+use crate::syntax::words::is_creator;
+use crate::syntax::zlib::unpack;
 use deltille_files::export::kind::SOFTWARE;
 use deltille_files::limits::{Exceeded, Limits};
 

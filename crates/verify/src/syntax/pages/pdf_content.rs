@@ -5,9 +5,9 @@
 use glam::DVec2;
 use kurbo::{BezPath, Shape as _};
 
-use crate::construct::findings::Findings;
-use crate::construct::pages::ink::{Ink, OFF_PAGE};
-use crate::construct::text::{decimal, start};
+use crate::syntax::findings::Findings;
+use crate::syntax::pages::ink::{Ink, OFF_PAGE};
+use crate::syntax::text::{decimal, start};
 use deltille_files::export::pdf::{CONTOUR, OVERPRINT, WHITE};
 use deltille_files::limits::{Exceeded, Limits};
 use deltille_layout::Finish;

@@ -19,7 +19,7 @@ use super::write::kind_name;
 use super::{
     CORNERS_SCHEMA, EARLIER_IMAGES_SCHEMA, IMAGES_SCHEMA, ImageRecord, SCHEMA, TableError,
 };
-use crate::export::corners::detection;
+use crate::export::detections::detection;
 use crate::limits::{self, Broken, Kind as Limit, Limits};
 use deltille_core::detection::{Detection, Grid, GridCorner, InkEstimate, Reason, ToneEstimate};
 use deltille_core::lattice::GridKind;

@@ -93,7 +93,7 @@ pub enum TableError {
     File(String),
     /// The file contains another table.
     #[error(
-        "neither a `corners` nor a `images` table: it has no column `{0}`; use the files that \
+        "neither a `corners` nor an `images` table: it has no column `{0}`; use the files that \
          `deltille detect --format parquet` wrote"
     )]
     Other(&'static str),

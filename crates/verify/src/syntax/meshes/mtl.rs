@@ -1,9 +1,9 @@
 //! The lines of a material library that every viewer interprets the same way: materials that show their texture
 //! unchanged.
 
-use crate::construct::findings::Findings;
-use crate::construct::text::{is_plain_file_name, start};
-use crate::construct::words::is_creator;
+use crate::syntax::findings::Findings;
+use crate::syntax::text::{is_plain_file_name, start};
+use crate::syntax::words::is_creator;
 
 /// The required statements of a material, word for word: no ambient light, white, no gloss. Viewers assume different
 /// values for an omitted statement.

@@ -7,10 +7,10 @@ use glam::DVec2;
 use lopdf::xref::XrefEntry;
 use lopdf::{Dictionary, Document, Object, ObjectId, StringFormat, decode_text_string};
 
-use crate::construct::findings::Findings;
-use crate::construct::pages::pdf_content;
-use crate::construct::words::{Words, is_creator};
-use crate::construct::zlib::unpack;
+use crate::syntax::findings::Findings;
+use crate::syntax::pages::pdf_content;
+use crate::syntax::words::{Words, is_creator};
+use crate::syntax::zlib::unpack;
 use deltille_files::export::pdf::{VERSION, color_spaces, graphics_states};
 use deltille_files::limits::Limits;
 use deltille_layout::Finish;
@@ -36,7 +36,7 @@ const BINARY_MARK: &[u8] = b"\n%\xbb\xad\xc0\xde\n";
 /// # Errors
 ///
 /// Returns an error if the file is not a readable PDF or exceeds the limits.
-pub(in crate::construct) fn check(
+pub(in crate::syntax) fn check(
     bytes: &[u8],
     words: &Words,
     limits: &Limits,
