@@ -19,7 +19,8 @@
 //! | 5 | [`synth`] | synthetic images of a target | |
 //! | 4 | [`detect`] | from pixels to labelled corners | `deltille-detect` |
 //! | 5 | [`calibrate`] | from detections to calibrated cameras | `deltille-calibrate` |
-//! | 6 | [`limits`] | limits on the resources that a file may use, and handling of panics in other code | `deltille-files` |
+//! | 6 | [`limits`] | limits on the resources that a file may use, and handling of panics in
+//! third-party code | `deltille-files` |
 //! | 6 | [`photograph`] | images in any common format | |
 //! | 6 | [`export`] | writing and reading of artwork, targets and results | |
 //! | 6 | [`report`] | calibration reports as HTML | |

@@ -98,7 +98,7 @@ def test_written_results_are_skipped_and_can_be_calibrated(shots, target, tmp_pa
     out = tmp_path / "found"
     first = deltille.ray.detect_to(out, shots / "a", target, images_per_file=2, batch_size=2)
     assert (first.images, first.errors, first.skipped) == (5, 0, 0)
-    # The file left by a task that is lost between writing its two files.
+    # The file left by a task that was killed between writing its two files.
     orphan = out / "corners/lost-000000.parquet"
     shutil.copy(next((out / "corners").iterdir()), orphan)
     second = deltille.ray.detect_to(out, shots, target)
@@ -146,7 +146,7 @@ def test_errors_are_reported_before_work_starts(shots, target, tmp_path):
         deltille.ray.detect(shots, target, per="row")
     with pytest.raises(deltille.Error):
         deltille.ray.detect(shots)
-    # A folder without images is not an error; a run before may have emptied it.
+    # A folder without images is not an error; an earlier run may have emptied it.
     (tmp_path / "empty").mkdir()
     assert deltille.ray.detect(tmp_path / "empty", target).count() == 0
     assert deltille.ray.detect_to(tmp_path / "out", tmp_path / "empty", target).images == 0

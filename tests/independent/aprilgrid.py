@@ -1,11 +1,11 @@
-"""AprilGrids, judged by OpenCV and by Kalibr's own formulas.
+"""AprilGrids, checked with OpenCV and with Kalibr's formulas.
 
     python aprilgrid.py path/to/deltille FOLDER
 
-makes grids in FOLDER, draws their pages by poppler, and asks of OpenCV's ArUco detector that it finds every tag with its
-id and its corners; that Kalibr's target file, from which corners are computed as Kalibr does, gives the places of the
-description; that every dark square of Kalibr's drawing is dark, and nothing else; and photographs a grid: `deltille detect`
-must find what is seen, no less precisely than OpenCV. Needs numpy, OpenCV, PyYAML, pdftoppm and pdftocairo.
+makes grids in FOLDER and renders their pages with poppler. OpenCV's ArUco detector must find every tag with its id and
+its corners. The corners that Kalibr computes from its target file must be those of the description. Exactly the dark
+squares of Kalibr's drawing must be dark. In synthetic photographs of a grid, `deltille detect` must find the visible
+corners at least with the precision of OpenCV. Needs numpy, OpenCV, PyYAML, pdftoppm and pdftocairo.
 """
 
 import json
@@ -47,7 +47,7 @@ def check(deltille, folder, name, options, dictionary):
         "target_type": "aprilgrid", "tagCols": columns, "tagRows": rows, "tagSize": spec["tag_mm"] / 1000,
         "tagSpacing": spec["gap"], "codeOffset": spec["first_id"],
     }
-    # Kalibr's file is there where Kalibr reads the grid.
+    # Kalibr's file exists exactly if Kalibr supports the grid.
     described = folder / f"{name}.yaml"
     assert described.exists() == is_kalibrs
     if is_kalibrs:
@@ -65,7 +65,7 @@ def check(deltille, folder, name, options, dictionary):
     turn = np.exp(1j * placement["angle_rad"])
 
     def px(points_mm):
-        """Pixels of places in the frame of the panel."""
+        """Pixels of positions in the frame of the panel."""
         page = (points_mm[:, 0] + 1j * points_mm[:, 1]) * turn + complex(*placement["origin_mm"])
         return np.c_[page.real, sheet["height_mm"] - page.imag] * DPI / 25.4 - 0.5
 
@@ -76,7 +76,7 @@ def check(deltille, folder, name, options, dictionary):
     worst = np.hypot(*np.transpose(off)).max() * 25.4 / DPI
     assert worst < 0.25, f"{name}: {worst} mm"
 
-    # Kalibr's drawing: tags, and squares of spacing x size at the corners of each. The cells are OpenCV's business.
+    # Kalibr's drawing: tags, and squares of spacing x size at the corners of each. OpenCV checks the cells.
     size, spacing = 1000 * grid["tagSize"], grid["tagSpacing"]
     side = 40
     low, high = -spacing * size, points.max(0)[:2] + spacing * size
@@ -101,8 +101,8 @@ def check(deltille, folder, name, options, dictionary):
 
 
 def by_opencv(image, grid, panel, dictionary):
-    """Corners that OpenCV finds, by id. Its AprilTags are Kalibr's turned by 180°: its corners, clockwise from the upper
-    left, begin here at the lower right one."""
+    """Corners that OpenCV finds, by id. Its AprilTags are those of Kalibr rotated by 180°, so its corners, clockwise
+    from the upper left, begin here at the lower right."""
     parameters = ARUCO.DetectorParameters()
     parameters.markerBorderBits = round(panel["border_bits"])
     parameters.cornerRefinementMethod = ARUCO.CORNER_REFINE_SUBPIX
@@ -120,7 +120,7 @@ def by_opencv(image, grid, panel, dictionary):
 
 
 def photographs(deltille, folder, name, target, grid, dictionary):
-    """Errors of both, px, in photographs whose truth is known."""
+    """Errors of both detectors, px, in synthetic photographs with known ground truth."""
     page, shots = Page(folder / f"{name}.json"), folder / f"{name}-shots"
     shots.mkdir(exist_ok=True)
     panel = target["panels"][0]

@@ -1,14 +1,14 @@
-"""Standard deviations of a camera whose board is not quite what its description says, in simulation.
+"""Simulation: standard deviations of a camera that is calibrated with a board that deviates from its description.
 
     python board_errors.py path/to/deltille FOLDER [--kind sheet|corners|both|none] [--size 0.05] [--views 20]
                            [--seeds 1-40] [--noise 0.1] [--measure] [--accuracy 0.05mm] [--repeats]
 
-A checkerboard of 10 × 11 corners, 20 mm apart, is in every view distorted alike: `sheet` is stretched, sheared and bent
-at random, `corners` displaces each corner by itself, with `--size` mm rms a coordinate; `both` has both. Prints how
-far fx, fy, cx, cy are from the truth in their deviations from noise and in the observed ones, rms over seeds, and with
---measure the same of the positions of corners. With --repeats the camera is calibrated a second time from other views
-of the same board, and `compare` has to find it unchanged: prints in how many of all repeats it does not, at 5 % and at
-its own level. Needs numpy.
+A checkerboard of 10 × 11 corners, 20 mm apart, has the same errors in every view: `sheet` is stretched, sheared and
+bent at random, `corners` displaces each corner independently, with an RMS of `--size` mm per coordinate; `both`
+combines them. Prints the errors of fx, fy, cx, cy in units of their standard deviations, both those from noise and the
+observed ones, RMS over seeds; with --measure also the errors of the corner positions. With --repeats the camera is
+calibrated a second time from other views of the same board, and `compare` must find it unchanged: prints the fraction
+of repeats in which it reports a change, at 5 % and at its own significance level. Needs numpy.
 """
 
 import argparse
@@ -61,11 +61,11 @@ def errors(random, board, kind, size):
 
 
 def view(random, board, noise):
-    """The corners of a view that shows all of the board."""
+    """The corners of a view that shows the whole board."""
     while True:
         turn = random.uniform([-0.7, -0.7, -0.5], [0.7, 0.7, 0.5]) + 1e-9
         place = random.uniform([-180, -130, 280], [180, 130, 600])
-        # Rows run upwards on the board and downwards in the image, and its face is towards the camera.
+        # Rows run upwards on the board and downwards in the image, and its front faces the camera.
         middle = np.array([(COLS - 1) / 2, (ROWS - 1) / 2, 0]) * EDGE_MM
         pixels = project((board - middle) * [1, -1, -1] @ rotation(turn).T + place)
         if (pixels > MARGIN_PX).all() and (pixels < [WIDTH - MARGIN_PX, HEIGHT - MARGIN_PX]).all():
@@ -124,10 +124,10 @@ def simulate(args, seed):
 
 
 def of_map(path, plan, offsets):
-    """Mean square of how far measured corners are off, in deviations of a coordinate."""
+    """Mean squared error of measured corners, in units of the standard deviation of a coordinate."""
     x, y = (plan - plan.mean(0))[:, :2].T
     one, zero = np.ones_like(x), np.zeros_like(x)
-    # Moves, rotations and a scale are not measured.
+    # Translations, rotations and a scale are not observable.
     plane = [np.r_[one, zero], np.r_[zero, one], np.r_[-y, x], np.r_[x, y]]
     truth = offsets.copy()
     left = lambda modes, values: values - np.stack(modes, 1) @ np.linalg.lstsq(np.stack(modes, 1), values, rcond=None)[0]

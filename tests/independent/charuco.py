@@ -1,11 +1,11 @@
-"""ChArUco boards, judged by OpenCV.
+"""ChArUco boards, checked with OpenCV.
 
     python charuco.py path/to/deltille FOLDER
 
-makes boards in FOLDER, of both of OpenCV's patterns and several dictionaries, and asks of OpenCV's detector that it
-finds every corner on the page, with the id, the place in space and the place on the page that the description states;
-that OpenCV's own picture of the board shows the same; and photographs them: `deltille detect` must find what is seen,
-no less precisely than OpenCV. Needs numpy, OpenCV 4.8 or later, pdftoppm and pdftocairo.
+makes boards in FOLDER with both of OpenCV's patterns and several dictionaries. OpenCV's detector must find every corner
+on the page with the id and the positions, in space and on the page, that the description states. OpenCV's own image of
+the board must show the same pattern. In synthetic photographs, `deltille detect` must find the visible corners at least
+with the precision of OpenCV. Needs numpy, OpenCV 4.8 or later, pdftoppm and pdftocairo.
 """
 
 import json
@@ -30,7 +30,7 @@ BOARDS = {
     "many": "--squares 23x16 --edge 12mm --dictionary 7x7_1000 --marker 9mm --first-id 800",
 }
 
-# Boards that are photographed too, and how.
+# Boards that are also photographed, and their settings.
 PHOTOGRAPHED = ["usual", "odd", "april"]
 MIN_FOUND = 0.93
 SCENES = [
@@ -38,7 +38,7 @@ SCENES = [
     Scene(tilt_deg=30, tone="srgb"),
     Scene(tilt_deg=60, tone="s-curve", noise=0.01, focal_px=1800.0),
 ]
-# Corners farther from their place than this have a wrong label.
+# Corners farther from their true position than this have a wrong label.
 WRONG_PX = 2.0
 
 
@@ -48,7 +48,7 @@ def run(*command):
 
 
 def board_of(target):
-    """OpenCV's board of the same numbers."""
+    """OpenCV's board with the same parameters."""
     spec = target["spec"]
     dictionary = ARUCO.getPredefinedDictionary(getattr(ARUCO, spec["dictionary"]))
     count = spec["squares"][0] * spec["squares"][1] // 2
@@ -65,7 +65,7 @@ def detector_of(board):
 
 
 def check_page(folder, name, target, board):
-    """The page as poppler draws it."""
+    """Checks the page as rendered by poppler."""
     run("pdftoppm", "-r", DPI, "-gray", "-singlefile", "-png", folder / f"{name}.pdf", folder / f"{name}-page")
     image = cv2.imread(str(folder / f"{name}-page.png"), cv2.IMREAD_GRAYSCALE)
     places, ids, _, markers = detector_of(board).detectBoard(image)
@@ -73,7 +73,7 @@ def check_page(folder, name, target, board):
     corners = {corner["id"]: corner for corner in panel["corners"]}
     assert ids is not None and sorted(ids.ravel()) == sorted(corners), f"{name}: {ids}"
     assert sorted(markers.ravel()) == sorted(tag["id"] for tag in panel["tags"]), f"{name}: {markers}"
-    # The same numbers, and the same places in space.
+    # The same ids, and the same positions in space.
     points = board.getChessboardCorners()
     stated = np.array([corners[index]["target_mm"] for index in range(len(corners))])
     assert np.abs(points - stated).max() < 1e-4, f"{name}: {points - stated}"
@@ -88,7 +88,7 @@ def check_page(folder, name, target, board):
 
 
 def check_pattern(folder, name, target, board):
-    """OpenCV's own picture of the board, against the page: every pixel but those at edges."""
+    """Compares OpenCV's own image of the board with the page: every pixel except those at edges."""
     image = cv2.imread(str(folder / f"{name}-page.png"), cv2.IMREAD_GRAYSCALE)
     side_px = 40
     columns, rows = target["spec"]["squares"]
@@ -96,7 +96,7 @@ def check_pattern(folder, name, target, board):
     panel, sheet = target["panels"][0], target["sheets"][0]
     placement, edge = sheet["placements"][0], panel["edge_mm"]
     turn = np.exp(1j * placement["angle_rad"])
-    # Pixels of OpenCV's picture, in the target frame, on the panel, on the page.
+    # Pixels of OpenCV's image, in the target frame, on the panel, and on the page.
     y, x = np.mgrid[0 : rows * side_px, 0 : columns * side_px]
     along = [(axis + 0.5) * edge / side_px for axis in (x, y)]
     shift = panel["pose"]["translation_mm"]
@@ -111,7 +111,7 @@ def check_pattern(folder, name, target, board):
 
 
 def photographs(deltille, folder, name, target, board):
-    """Errors of both detectors, px, in photographs whose truth is known."""
+    """Errors of both detectors, px, in synthetic photographs with known ground truth."""
     page, shots = Page(folder / f"{name}.json"), folder / f"{name}-shots"
     shots.mkdir(exist_ok=True)
     truths = {}

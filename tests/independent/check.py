@@ -1,9 +1,9 @@
-"""Detections in photographs of printed pages that deltille did not draw.
+"""Detection in photographs of printed pages, rendered independently of deltille.
 
     python check.py path/to/deltille FOLDER [N]
 
-makes targets in FOLDER, photographs them, and compares what `deltille detect` finds with where the
-corners are; of the scenes every Nth. Needs numpy, OpenCV and pdftocairo.
+makes targets in FOLDER, photographs them, and compares the detections of `deltille detect` with the true corners. With
+N, uses every Nth scene. Needs numpy, OpenCV and pdftocairo.
 """
 
 import json
@@ -20,13 +20,13 @@ from photograph import Page, Scene, photograph
 # Ink is found to a fiftieth of a pixel at the usual 3 px/mm.
 INK_UM = 6.0
 
-# Corners farther from their place than this part of an edge have a wrong label.
+# Corners farther from their true position than this fraction of an edge have a wrong label.
 WRONG = 0.3
 
 
 @dataclass
 class Check:
-    """A scene, and what must come of it. Views with other names of seeds differ in pose and noise."""
+    """A scene and its expected result. Views with different seed names differ in pose and noise."""
 
     target: str
     scene: Scene

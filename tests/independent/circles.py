@@ -1,9 +1,9 @@
-"""Grids of circles, judged by OpenCV.
+"""Grids of circles, checked with OpenCV.
 
     python circles.py path/to/deltille FOLDER
 
-makes grids in FOLDER, draws their pages by poppler, and asks of OpenCV's findCirclesGrid that it finds all circles, in the
-order and at the places that the description states. Needs numpy, OpenCV and pdftoppm.
+makes grids in FOLDER and renders their pages with poppler. OpenCV's findCirclesGrid must find all circles in the order
+and at the positions that the description states. Needs numpy, OpenCV and pdftoppm.
 """
 
 import json
@@ -30,7 +30,7 @@ def run(*command):
 
 
 def object_points(spec):
-    """As OpenCV's samples for calibration have them."""
+    """The object points of OpenCV's calibration samples."""
     (columns, rows), step = spec["circles"], spec["spacing_mm"]
     x = (lambda i, j: 2 * j + i % 2) if spec["asymmetric"] else (lambda i, j: j)
     return np.array([[x(i, j) * step, i * step, 0.0] for i in range(rows) for j in range(columns)])
@@ -47,7 +47,7 @@ def check(deltille, folder, name, options):
     run("pdftoppm", "-r", DPI, "-gray", "-singlefile", "-png", folder / f"{name}.pdf", folder / name)
     image = cv2.imread(str(folder / f"{name}.png"), cv2.IMREAD_GRAYSCALE)
     placement = sheet["placements"][0]
-    # So that the board stands upright, as it was made.
+    # Rotates the page so that the board is upright, as it was made.
     if abs(placement["angle_rad"]) > 0.1:
         image = cv2.rotate(image, cv2.ROTATE_90_CLOCKWISE)
     places = np.array([complex(*corner["panel_mm"]) for corner in corners])
@@ -56,7 +56,7 @@ def check(deltille, folder, name, options):
     if abs(placement["angle_rad"]) > 0.1:
         stated = np.c_[sheet["height_mm"] - stated[:, 1], stated[:, 0]]
     kind = cv2.CALIB_CB_ASYMMETRIC_GRID if spec["asymmetric"] else cv2.CALIB_CB_SYMMETRIC_GRID
-    # The largest circles that are sought by default are small.
+    # The default maximum area of circles is too small.
     parameters = cv2.SimpleBlobDetector.Params()
     parameters.maxArea = 1e6
     blobs = cv2.SimpleBlobDetector.create(parameters)

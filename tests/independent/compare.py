@@ -1,7 +1,7 @@
-"""Compares two cameras by OpenCV and numpy, and with what `deltille compare` says: compare.py PROGRAM FOLDER.
+"""Compares two cameras with OpenCV and numpy, and checks the result of `deltille compare`: compare.py PROGRAM FOLDER.
 
-The lens is projected by cv2.projectPoints and inverted by Newton's method on differences; the motion is found by
-Gauss and Newton on differences. Nothing of deltille takes part but the parameters in its files.
+cv2.projectPoints projects points, and Newton's method with finite differences inverts the lens. The motion is estimated
+with the Gauss–Newton method and finite differences. Only the parameters in deltille's files are used, none of its code.
 """
 
 import json
@@ -25,7 +25,7 @@ def camera(name):
 
 
 def solved(function, x, size=1e-6, steps=20):
-    """The least squares of a function by differences."""
+    """Minimizes a sum of squares with finite-difference derivatives."""
     for _ in range(steps):
         here = function(x)
         columns = [(function(x + size * e) - function(x - size * e)) / (2 * size) for e in np.eye(len(x))]
@@ -34,7 +34,7 @@ def solved(function, x, size=1e-6, steps=20):
 
 
 def rays(project, pixels):
-    """The points at depth 1 that are seen at pixels."""
+    """The points at depth 1 that project to the given pixels."""
     flat = np.zeros_like(pixels)
     lift = lambda q: np.column_stack([q, np.ones(len(q))])
     for _ in range(50):
@@ -59,7 +59,7 @@ def check(distance):
     points /= np.linalg.norm(points, axis=1)[:, None]
     move = lambda x: points @ cv2.Rodrigues(x[:3])[0].T + (0 if distance is None else x[3:] / distance)
     start = np.zeros(3 if distance is None else 6)
-    # A move in hundreds of millimetres, a turn in radians.
+    # Translation in hundreds of millimetres, rotation in radians.
     unit = np.ones(3) if distance is None else np.array([1, 1, 1, 100, 100, 100.0])
     off = lambda x: (second(move(unit * x)) - pixels).ravel()
     ours = off(solved(off, start)).reshape(-1, 2)

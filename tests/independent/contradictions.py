@@ -1,10 +1,11 @@
-"""Does `deltille verify` notice when a single value of a target's description is another one?
+"""Does `deltille verify` notice a change of a single value in a target's description?
 
     python tests/independent/contradictions.py target/release/deltille FOLDER [SAMPLES]
 
 Makes targets of each kind with all their files, changes values of their JSON one at a time (numbers a little and a lot,
-texts, booleans, nulls), SAMPLES of each field (2), and runs `verify` beside files that were not changed. What is not noticed must be among
-what nothing else in the description, and nothing that is made, depends on: a reason is told for each.
+texts, booleans, nulls), SAMPLES of each field (2), and runs `verify` beside files that were not changed. A change may
+remain unnoticed only if no other value in the description and no file depends on the value; the list below gives a
+reason for each.
 """
 
 import collections
@@ -29,10 +30,10 @@ MADE = {
     "cuboid": "cuboid --size 60x50x40mm --pdf --stl",
 }
 
-# By how much a number is changed: what print is compared to, 0.02 mm, lies between.
+# Small and large change of a number: the tolerance for prints, 0.02 mm, lies between them.
 LITTLE, MUCH = 0.002, 0.5
 
-# What is not noticed, and why.
+# Changes that are not noticed, with reasons.
 UNNOTICED_LITTLE = [
     (r"sheets\..*", "pages are compared to 0.02 mm"),
     (r"spec\.skeleton\..*", "the walls of a skeleton are in its own files, whose coordinates are compared to 0.02 mm"),
@@ -48,7 +49,7 @@ UNNOTICED = [
 
 
 def values(value, path=()):
-    """The places of all values that are neither lists nor objects."""
+    """The paths of all values that are not lists or objects."""
     if isinstance(value, dict):
         for key, inner in value.items():
             yield from values(inner, (*path, key))
@@ -66,7 +67,7 @@ def at(value, path):
 
 
 def kind_of(path):
-    """The field that a place is of: indices of lists of objects count as one, those of coordinates do not."""
+    """The field to which a path belongs: indices into lists of objects are merged, indices of coordinates are not."""
     parts = []
     for i, step in enumerate(path):
         is_object = isinstance(step, int) and i + 1 < len(path) and isinstance(path[i + 1], str)
@@ -75,7 +76,7 @@ def kind_of(path):
 
 
 def changes(old):
-    """Other values, each with whether it is near."""
+    """Changed values, each with a flag for a small change."""
     if isinstance(old, bool):
         return [(not old, False)]
     if isinstance(old, int):

@@ -1,10 +1,10 @@
-"""Patches of boards of position codes, drawn by cairo and seen by numpy: is every label that of the print?
+"""Patches of boards with position codes, rendered by cairo and resampled by numpy: is every label correct?
 
     dense.py <program> <folder> [patches]
 
-Patches of about three by four tiles of a board of a thousand tiles, anywhere on it and turned at random, two pixels a
-cell, blurred by one: as they are, and with three of ten tiles painted over with cells of another kind. Then whole views
-of a board with position codes and of one without: are its corners as precise?
+Patches of about three by four tiles of a board of a thousand tiles, at random positions and rotations, with two pixels
+per cell and a blur of one pixel: unchanged, and with other cells painted over those of three of ten tiles. Then whole
+views of a board with position codes and of one without: are the corners equally precise?
 """
 
 import json
@@ -20,12 +20,12 @@ from photograph import PX_PER_MM, Page
 SUPERSAMPLING = 4
 BLUR_PX = 1.0
 NOISE = 0.01
-# Edge of a tile in widths of a cell: three cells, and a border of 1.5 on three sides.
+# Edge of a tile in cell widths: three cells, and a border of 1.5 cells on three sides.
 CELLS_ACROSS = 7.5
 
 
 class Board:
-    """A board that was made, and where its corners are on the page."""
+    """A board, and the positions of its corners on the page."""
 
     def __init__(self, program, folder, name, *settings):
         subprocess.run(
@@ -37,7 +37,8 @@ class Board:
         self.corners = dict(zip(((row, col) for _, row, col in self.page.keys), self.page.corners_mm))
 
     def view(self, rng, edge_px, size, hidden=0.0):
-        """A picture of this width and height somewhere on the board, and the corners in it, px; of no size, of the whole board."""
+        """An image of this width and height at a random position on the board, and the corners in it, px; without a
+        size, an image of the whole board."""
         scale = edge_px / self.page.edge_mm
         angle = rng.uniform(0, 2 * np.pi)
         turn = scale * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
@@ -58,7 +59,7 @@ class Board:
         return np.clip(np.rint(255 * image), 0, 255).astype(np.uint8), corners
 
     def looked_at(self, turn, shift, size, scale):
-        """The page from many points of every pixel."""
+        """The page, sampled at many points of every pixel."""
         reduced = max(1, int(PX_PER_MM / (scale * SUPERSAMPLING)))
         source = self.page.reduced_by(reduced).astype(np.float32)
         mm = reduced / PX_PER_MM
@@ -73,7 +74,7 @@ class Board:
         )
 
     def paint_over(self, image, corners, rng, part):
-        """Other cells where some tiles have theirs."""
+        """Replaces the cells of some tiles by other cells."""
         for (row, col), a in corners.items():
             ends = [corners.get(key) for key in ((row, col + 1), (row + 1, col))]
             if any(end is None for end in ends) or rng.random() > part:
@@ -97,7 +98,7 @@ def detect(program, board, folder, images):
         old.unlink()
     for index, image in enumerate(images):
         cv2.imwrite(str(folder / f"{index}.png"), image)
-    # Exit code 1 says that a picture shows no board.
+    # Exit code 1 means that an image shows no board.
     command = [program, "detect", folder, "--target", board.json, "--force", "-o", folder]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode in (0, 1), done.stderr
@@ -105,7 +106,7 @@ def detect(program, board, folder, images):
 
 
 def labelled(detection, corners):
-    """Distances of labelled corners from their places, px."""
+    """Distances of labelled corners from their true positions, px."""
     found = [corner for grid in detection["grids"] for corner in grid["corners"] if corner["id"] is not None]
     places = [corners[corner["row"], corner["col"]] for corner in found]
     return [np.hypot(c["x"] - x, c["y"] - y) for c, (x, y) in zip(found, places)]
@@ -150,7 +151,7 @@ def precision(program, folder):
             errors[name] = np.sqrt(np.mean(np.square(np.concatenate(off)) / 2))
         words = ", ".join(f"{error:.4f} px {name}" for name, error in errors.items())
         print(f"tiles of {edge_px:g} px: {words}")
-        # Cells take some pixels from corners where tiles are small.
+        # On small tiles, cells reduce the number of pixels around a corner.
         allowed = 1.5 if edge_px < 20 else 1.1
         assert errors["with position codes"] < allowed * errors["without"]
 

@@ -1,12 +1,13 @@
 """Every shipped family, or families in files, verified from the file alone: families.py DELTAG [--hidden] [FAMILY …].
 
-Shares no code with the generator. Cells are triangles and squares in the plane; turns, mirrors and neighbours come from
-where their middles come to lie. Checked are distance, distance histogram, rules, false positives by fair coins and the
-fingerprint, against the file, those that it had before it grew too; and what `deltag verify-family` says of the distance and
-of that in a mirror. With --hidden, and of every family that claims one, the distance is computed that is left where a corner,
-the cells along an edge, or a triangle of four cells are hidden, wherever they lie; it must be what `deltag info` says, and
-what the file claims at least. Of a family that lists a part of a linear code by a stride the whole code is proved: that a
-turn leaves it as it is, its distance by the weights of its dual, and how many tags it has. Needs numpy.
+Shares no code with the generator. Cells are triangles and squares in the plane; rotations, reflections and neighbours
+follow from the positions of their centres. The distance, distance histogram, rules, false-positive rates for random
+cells and the fingerprint are compared with the file, as are the fingerprints from before it was extended. The distance
+and the distance to mirrored tags are compared with the output of `deltag verify-family`. With --hidden, and for every
+family that claims one, the distance is also computed with hidden cells, at every position: a corner, the cells along an
+edge, or a triangle of four cells. It must equal the output of `deltag info` and be at least the claim of the file. If a
+family lists part of a linear code by a stride, the whole code is checked: its invariance under rotations, its distance
+from the weights of its dual code, and its number of tags. Needs numpy.
 """
 
 import hashlib
@@ -20,12 +21,12 @@ import sys
 import numpy as np
 
 FOLDER = pathlib.Path(__file__).parents[2] / "families"
-# Words compared at once.
+# Number of words compared at a time.
 CHUNK = 1 << 24
 
 
 def middles(kind, rows):
-    """Middle of the cell of each bit, from the middle of the tag; edges of cells are 1 long."""
+    """Centre of the cell of each bit, relative to the centre of the tag; cell edges have length 1."""
     places = {}
     for row in range(rows):
         if kind == "checker":
@@ -33,8 +34,8 @@ def middles(kind, rows):
                 places[row * rows + rows - 1 - k] = complex(k + 0.5, row + 0.5)
             continue
         for k in range(2 * (rows - row) - 1):
-            # The lower left corner of an upright cell, and its middle a third of the height above; an inverted one lies
-            # half an edge to the right, two thirds above.
+            # The lower left corner of an upright cell. Its centre is a third of the height above; the centre of an
+            # inverted cell is half an edge to the right and two thirds of the height above.
             left, height = k // 2 + row / 2, math.sqrt(3) / 2
             middle = complex(left + 0.5, (row + 1 / 3) * height) if k % 2 == 0 else complex(left + 1, (row + 2 / 3) * height)
             places[rows**2 - 1 - (rows - 1 - row) ** 2 - k] = middle
@@ -43,7 +44,7 @@ def middles(kind, rows):
 
 
 def moved(places, onto):
-    """For each bit the one whose cell comes to lie on its cell."""
+    """For each bit, the bit whose cell is mapped onto its cell."""
     apart = np.abs(places[:, None] - onto[None])
     assert (apart.min(1) < 1e-9).all()
     return apart.argmin(1)
@@ -67,7 +68,7 @@ def distances(words, others):
 
 
 def left_of(words, turned, hidden):
-    """Least distance of any of some words from any other of all words, in the cells that are not hidden."""
+    """Minimum distance between the given words and all other words, counted in the cells that are not hidden."""
     seen = np.uint64(sum(1 << int(bit) for bit in np.nonzero(~hidden)[0]))
     counts = distances(words & seen, turned & seen)
     counts[0] -= len(words)
@@ -75,15 +76,16 @@ def left_of(words, turned, hidden):
 
 
 def with_hidden_cells(codes, turned, places):
-    """Distances left where the four cells of a corner, where all cells along an edge, and where a triangle of four is hidden."""
+    """Minimum distances with hidden cells: the four cells of a corner, all cells along an edge, and a triangle of four
+    cells."""
     height = places.imag
     rows = math.isqrt(len(places))
-    # A corner of four is the uppermost two rows of cells; along the lower edge lie those that have a side or a corner on it.
-    # All turns of all words are there, so that one corner and one edge stand for the three.
+    # A corner of four cells consists of the uppermost two rows; the cells along the lower edge have a side or a vertex
+    # on it. All rotations of all words are included, so one corner and one edge represent all three.
     corner = height > np.sort(height)[-4] - 1e-6
     edge = height < height.min() + math.sqrt(3) / 6 + 1e-6
     assert (corner.sum(), edge.sum()) == (4, 2 * rows - 1)
-    # A triangle of four is a cell with three neighbours, and these.
+    # A triangle of four cells is a cell with its three neighbours.
     beside = abs(abs(places[:, None] - places[None]) - 1 / math.sqrt(3)) < 1e-6
     tiles = [row | (np.arange(len(places)) == cell) for cell, row in enumerate(beside) if row.sum() == 3]
     assert len(tiles) == rows * (rows - 1) // 2 + (rows - 3) * (rows - 2) // 2 and corner.tolist() in [tile.tolist() for tile in tiles]
@@ -92,7 +94,7 @@ def with_hidden_cells(codes, turned, places):
 
 
 def reduced(words):
-    """A basis whose leading bits are in no other word of it."""
+    """A basis in which each leading bit occurs in only one word."""
     basis = {}
     for word in words:
         for lead, row in basis.items():
@@ -105,7 +107,7 @@ def reduced(words):
 
 def linear_code(construction, bits, turn):
     """Basis of the linear code on the tag, and the word that is added to its words."""
-    # A turn moves what is in a cell to the one that has it as its source.
+    # A rotation moves the content of a cell to the cell that has it as its source.
     circles = [(bit, turn[turn[bit]], turn[bit]) for bit in range(bits) if bit == min(bit, turn[bit], turn[turn[bit]]) != turn[bit]]
     arrangement, centre = construction["arrangement"], [bit for bit in range(bits) if turn[bit] == bit]
     cells = [int(circles[place][(j + start) % 3]) for place, start in zip(arrangement["places"], arrangement["starts"]) for j in range(3)] + centre
@@ -124,12 +126,13 @@ def sums(words):
 
 
 def prove(name, text, codes, turn, program):
-    """The linear code that a family lists a part of."""
+    """Checks the linear code that contains the codes of a family."""
     bits, distance = text["bits"], text["distance"]
     basis, added = linear_code(text["construction"], bits, turn)
     rows = np.array(list(basis.values()), np.uint64)
     assert len(reduced([*basis.values(), *map(int, permuted(rows, turn))])) == len(basis), "a turn changes the linear code"
-    # Words that meet all of the code in an even number of cells: a free bit, and the leading ones of the rows that have it.
+    # Words that are orthogonal to the whole code: each has one free bit, and the leading bits of the rows that contain
+    # it.
     dual = [1 << bit | sum(1 << lead for lead, row in basis.items() if row >> bit & 1) for bit in range(bits) if bit not in basis]
     assert not any((np.bitwise_count(rows & np.uint64(word)) & 1).any() for word in dual)
     assert not any((np.bitwise_count((codes ^ np.uint64(added)) & np.uint64(word)) & 1).any() for word in dual), "a code is not of the linear code"
@@ -142,7 +145,8 @@ def prove(name, text, codes, turn, program):
     assert of_code[0] == 1 and sum(of_code) == 2 ** len(basis) and min(of_code) == 0
     least = next(weight for weight in range(1, bits + 1) if of_code[weight])
     assert least >= distance, (least, distance)
-    # A word and its turn sum to 0 where the turn leaves it: as many words as the sums leave.
+    # A word is invariant if its sum with its rotation is 0; the number of invariant words follows from the rank of
+    # these sums.
     fixed = 2 ** (len(basis) - len(reduced(map(int, rows ^ permuted(rows, turn)))))
     tags = (2 ** len(basis) - fixed) // 3
     told = json.loads(subprocess.run([program, "bounds", f"d{bits}h{distance}", "--json"], check=True, capture_output=True).stdout)
@@ -157,7 +161,7 @@ def check(path, program, hidden):
     places = middles(kind, rows)
     turns, edge = (4, 1.0) if kind == "checker" else (3, 1 / math.sqrt(3))
     turn = moved(places, places * np.exp(2j * np.pi / turns))
-    # Any mirror does, as all turns are looked at: here the one that leaves the tag's vertical axis.
+    # Any reflection suffices, because all rotations are tested: here the reflection about the vertical axis of the tag.
     mirror = moved(places, -places.conjugate())
 
     turned = [codes]
@@ -174,7 +178,7 @@ def check(path, program, hidden):
     assert histogram == text["distance_histogram"], "distance_histogram"
 
     rules = text["rules"]
-    # What is free in the middle: a cell, or where a vertex is there the six around it.
+    # The free cells in the centre: one cell, or the six cells around a vertex.
     within = 1e-6 if abs(places).min() < 1e-6 else 1 / math.sqrt(3) + 1e-6
     free = abs(places) < within if rules.get("free") == "centre" else np.zeros(bits, bool)
     assert not any((codes >> np.uint64(bit) & np.uint64(1)).any() for bit in np.nonzero(free)[0]), "free cells are used"
@@ -217,7 +221,7 @@ def main():
     program, names = sys.argv[1], [name for name in sys.argv[2:] if name != "--hidden"]
     named = [pathlib.Path(name) if name.endswith(".json") else FOLDER / f"{name}.json" for name in names]
     paths = named or sorted(FOLDER.glob("*.json"))
-    # Position codes are no family like others: tests/independent/dense.py.
+    # Position codes are not a family of individual tags; tests/independent/dense.py checks them.
     paths = [path for path in paths if path.stem != "dense9"]
     for path in paths:
         check(path, program, "--hidden" in sys.argv)

@@ -1,17 +1,17 @@
-"""Boards for lasers, glass and print shops, read by others: finishes.py DELTILLE FOLDER.
+"""Boards for lasers, glass and print shops, read by other programs: finishes.py DELTILLE FOLDER.
 
-Lasers: ezdxf audits the DXF without an error, and lxml reads the SVG of the same board; shapely makes polygons of their closed
-outlines, which are valid and do not overlap. Without a kerf they cover what the printed page of the board shows; with one
-they are what shapely's own offset with mitred corners leaves of that, and the outline to cut is as much larger. Solids
-have the area of their printed faces.
+Lasers: ezdxf audits the DXF without an error, and lxml reads the SVG of the same board; shapely converts their closed
+outlines to polygons, which must be valid and must not overlap. Without a kerf, they must cover the dark area of the
+printed page. With a kerf, they must equal that area after shapely's inward offset with mitred corners, and the cut
+outline must be larger by the same offset. The drawings of solids must have the area of their printed faces.
 
-Glass: a mirrored page, drawn by poppler and turned over by numpy, is labelled whole by `deltille detect`, as it is printed
-nothing is.
+Glass: a mirrored page, rendered by poppler, gets no labels from `deltille detect` as printed, and all labels after
+numpy mirrors it back.
 
-Print shops: pikepdf finds the separations, their alternates and the overprint in the PDF; poppler and pdfium show the same
-as of a PDF in plain black.
+Print shops: pikepdf finds the separations, their alternates and the overprint in the PDF; poppler and pdfium render it
+like a PDF in plain black.
 
-Needs ezdxf, shapely, lxml, pikepdf, numpy, Pillow, and pdftoppm; pypdfium2 where it is there.
+Needs ezdxf, shapely, lxml, pikepdf, numpy, Pillow, and pdftoppm; pypdfium2 if it is installed.
 """
 
 import json
@@ -62,7 +62,7 @@ def even_odd(loops):
 
 
 def printed(svgs):
-    """What the tiles and fields of pages show: a polygon for each."""
+    """The dark areas of the tiles and fields of each page, as polygons."""
     shapes = []
     for svg in svgs:
         height = float(etree.parse(svg).getroot().get("height").removesuffix("mm"))
@@ -72,7 +72,7 @@ def printed(svgs):
 
 
 def points(loop, height):
-    """The points of a loop of path data, y up; curves as many chords."""
+    """The points of a loop of path data, y up; curves become polylines with many segments."""
     found = []
     for letter, words in re.findall(r"([MLC])([^MLCZ]*)", loop):
         numbers = np.array([float(word) for word in words.split()]).reshape(-1, 2) * (1, -1) + (0, height)
@@ -109,7 +109,7 @@ def of_svg(path):
 
 
 def regions(loops):
-    """Polygons of loops: counter-clockwise ones with the clockwise ones that lie in them."""
+    """Polygons from loops: each counter-clockwise loop with the clockwise loops inside it as holes."""
     rings = [Polygon(loop) for loop in loops]
     assert all(ring.is_valid for ring in rings)
     outer = [ring for ring in rings if ring.exterior.is_ccw]
@@ -117,7 +117,7 @@ def regions(loops):
     inside = {id(ring): [] for ring in outer}
     for hole in holes:
         at = hole.representative_point()
-        # That may be in an island within the hole.
+        # The point may lie in an island within the hole.
         around = [ring for ring in outer if ring.area > hole.area and ring.contains(at)]
         inside[id(min(around, key=lambda ring: ring.area))].append(hole.exterior.coords)
     made = [Polygon(ring.exterior.coords, inside[id(ring)]) for ring in outer]
@@ -147,7 +147,7 @@ def check_laser(program, folder, name, command, is_solid):
             polygons = regions(outlines["ENGRAVE"])
             found, together = sum(p.area for p in polygons), unary_union(polygons)
             assert abs(together.area / found - 1) < 1e-9, (name, "outlines overlap")
-            # Numbers of SVG have four digits; a circle is drawn with 360 sides.
+            # SVG coordinates have four decimals; a circle is drawn as a polygon with 360 sides.
             slack = 1e-4 if name == "circles" else 3e-5
             assert abs(found / area - 1) < slack, (name, kerf, ending, found, area)
             if is_solid:
@@ -165,7 +165,7 @@ def check_laser(program, folder, name, command, is_solid):
                 assert hole.buffer(kerf / 2).intersection(together).area < 1e-3, (name, kerf)
             quiet = max(5.0, panel["edge_mm"] / 4) if not panel["inverted"] else 0.0
             plate = np.array(together.bounds) + np.array([-1, -1, 1, 1]) * (quiet + kerf)
-            # Shrunken tips of tiles no longer reach to where tiles did.
+            # Mitred tips of shrunken tiles end short of the original tips.
             tips = 0.6 * kerf if panel["kind"] == "deltille" else 0.0
             assert np.abs(np.array(cut.bounds) - plate).max() < 2e-4 + tips, (name, cut.bounds, plate)
         told.append(f"{found / 100:.3f}")
@@ -181,7 +181,7 @@ def labelled(program, picture, target, folder):
     path = folder / "seen.png"
     Image.fromarray(np.pad(picture, 40, constant_values=255)).save(path)
     detect = [program, "detect", path, "--target", target, "-o", folder / "found", "--force"]
-    # It ends with 1 where nothing is labelled.
+    # The exit code is 1 if nothing is labelled.
     assert subprocess.run(detect, capture_output=True).returncode in (0, 1)
     grids = json.loads((folder / "found" / "seen.json").read_text())["grids"]
     return sum(corner.get("id") is not None for grid in grids for corner in grid["corners"])
@@ -189,7 +189,7 @@ def labelled(program, picture, target, folder):
 
 def check_mirrored(program, folder):
     for name, command in BOARDS.items():
-        # Untagged boards have two mirror images alike, and circles are not for this detector.
+        # Untagged boards equal their mirror image, and this detector does not support circles.
         if name in ("circles", "plain", "black-squares"):
             continue
         run(program, *command.split(), "--name", "back", "--pdf", "--mirrored", "-o", folder, "--force")
@@ -207,7 +207,7 @@ def check_spots(program, folder):
     contour, white = ["--contour", "CutContour"], ["--white", "RDG_WHITE"]
     pdfs = {}
     for kind, options in (("black", []), ("line", contour), ("spots", contour + white)):
-        # Labels have the name of the board.
+        # The labels on the sheet contain the name of the board.
         run(program, *BOARDS["tagged"].split(), "--name", "plate", *options, "--pdf", "-o", folder / kind)
         pdfs[kind] = folder / kind / "plate.pdf"
     with pikepdf.open(pdfs["spots"]) as pdf:
@@ -221,7 +221,7 @@ def check_spots(program, folder):
         (state,) = page.Resources.ExtGState.values()
         assert state.OP and state.op and int(state.OPM) == 1
         words = [str(operator) for _, operator in pikepdf.parse_content_stream(page)]
-        # The white comes first, and four lines are in the colour of the contour.
+        # White is drawn first, and four lines have the contour colour.
         assert words[:9] == ["gs", "cs", "scn", "m", "l", "l", "l", "h", "f*"], words[:9]
         assert words.count("CS") == words.count("S") == 4
     with pikepdf.open(pdfs["black"]) as pdf:

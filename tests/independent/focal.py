@@ -1,10 +1,10 @@
-"""The focal length of a camera with a tone curve, and a print whose ink has spread, over many seeds.
+"""The focal length estimated with a tone curve and an ink spread, over many seeds.
 
     python focal.py path/to/deltille FOLDER [SEEDS [TONE [INK_UM]]]
 
-photographs a page that cairo drew by a pinhole of known focal length, eight views a seed, calibrates from what
-`deltille detect` finds, and prints how far the focal length is off in its own standard deviations. Needs numpy,
-OpenCV and pdftocairo.
+photographs a page rendered by cairo with a pinhole camera of known focal length, eight views per seed, calibrates from
+the detections of `deltille detect`, and prints the error of the focal length in units of its standard deviation. Needs
+numpy, OpenCV and pdftocairo.
 """
 
 import json
@@ -23,7 +23,7 @@ TILTS_DEG = (0.0, 50.0)
 
 
 def deviation(deltille, page, target, folder, seed, tone, ink_um):
-    """How far fx is off, in px and in deviations."""
+    """The error of fx, in px and in standard deviations."""
     folder.mkdir(exist_ok=True)
     for view in range(VIEWS):
         tilt = float(np.random.default_rng([seed, view, 1]).uniform(*TILTS_DEG))

@@ -1,15 +1,17 @@
-"""Do two calibrations of one camera differ by as much as their uncertainties say? Halves of one recording.
+"""Do two calibrations of one camera differ as their uncertainties predict? Compares calibrations from two halves of one
+recording.
 
     python halves.py path/to/deltille DETECTIONS FOLDER --model radtan [--measure] [--seeds 100-119] [--split random]
                      [-- options of calibrate, such as --grid deltille --rows 10 --cols 11 --edge 20mm]
 
-splits the detections of one camera in two halves, calibrates each, compares the two at infinity, and prints a row: the
-difference found over the difference expected (rms over all splits), how many splits `compare` calls significant
-at 5 % and at its own level, and the least p. Splits are `random`, or `alternate`: of each pair of neighbours, by file
-name, one goes to either half at random, so that both halves have views of every kind.
+splits the detections of one camera into two halves, calibrates each, compares the results at infinity, and prints a
+row: the ratio of observed to expected difference (RMS over all splits), the numbers of splits that `compare` reports as
+significant at 5 % and at its own level, and the smallest p-value. Splits are `random` or `alternate`. An alternate
+split assigns the two images of each neighbouring pair, by file name, to different halves at random, so both halves
+contain all kinds of views.
 
-Both halves saw the same board. What its errors do to both alike is in neither the difference found nor the one
-expected.
+Both halves show the same board. Effects of its errors that are common to both are not part of the observed or the
+expected difference.
 """
 
 import argparse

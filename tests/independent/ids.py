@@ -1,8 +1,8 @@
-"""Are corners beside ids in small type as precise as without them?
+"""Do tag ids in small type reduce the precision of the corners beside them?
 
     ids.py <program> <folder>
 
-Boards with and without --tag-ids, drawn by cairo and seen by numpy from the same sides.
+Boards with and without --tag-ids, rendered by cairo and photographed with numpy from the same poses.
 """
 
 import pathlib

@@ -1,9 +1,10 @@
-"""Boards and solids of two bodies (3MF), read by others: inlays.py DELTILLE FOLDER.
+"""Boards and solids as two bodies (3MF), read by other programs: inlays.py DELTILLE FOLDER.
 
-lib3mf, the reader of the 3MF consortium, takes each file in its strict mode without a warning and finds both bodies
-manifold and oriented, with their names and colours. trimesh finds them closed; the black one has the volume of what the SVG
-of the same target shows (its loops, combined by shapely) times the depth, both together that of the plate or solid, and
-every corner of the description is a vertex of the black body; a skeleton is one closed body. The file is the same when it is made again.
+lib3mf, the reader of the 3MF consortium, must read each file in strict mode without a warning, and find both bodies
+manifold and oriented, with their names and colours. According to trimesh, both must be closed. The volume of the black
+body must be the dark area of the SVG of the same target (its loops, combined by shapely) times the depth. The total
+volume must be that of the plate or solid. Every corner of the description must be a vertex of the black body. A
+skeleton must be one closed body. A second run must write the same file.
 
 Needs lib3mf, trimesh, lxml, networkx and shapely.
 """
@@ -38,7 +39,7 @@ SOLIDS = {
 
 
 def dark_mm2(svgs):
-    """What the tiles and fields of pages show, by the even-odd rule."""
+    """The dark area of the tiles and fields of the pages, by the even-odd rule."""
     area = 0.0
     for svg in svgs:
         for path in re.findall(r'<path d="([^"]*)" id="(?:tile|field)-', svg.read_text()):
@@ -89,7 +90,7 @@ def check(program, folder, name, command, whole_mm3):
     for body in (white, black):
         assert body.is_watertight and body.is_winding_consistent, path
     dark = dark_mm2(sorted(folder.glob(f"{name}.svg")) + sorted(folder.glob(f"{name}-[0-9]*.svg")))
-    # Numbers of the SVG have four digits.
+    # The SVG coordinates have four decimals.
     assert abs(black.volume / (dark * INLAY_MM) - 1) < 2e-5, (name, black.volume, dark * INLAY_MM)
     width, height, thickness = scene.extents
     whole = whole_mm3 or width * height * PLATE_MM
@@ -106,7 +107,7 @@ def check(program, folder, name, command, whole_mm3):
 
 
 def check_skeleton(program, folder):
-    """The frame as 3MF is closed, and is that of the STL."""
+    """Checks that the frame in the 3MF is closed, and equals that of the STL."""
     command = [program, "octahedron", "--edge", "100mm", "--name", "frame", "--skeleton", "--3mf", "-o", folder]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     body = trimesh.load(folder / "frame-skeleton.3mf", process=False).geometry["skeleton"]

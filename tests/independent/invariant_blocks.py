@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Are the blocks of docs/families/invariant_bound.py those of the whole matrix?
+"""Do the blocks of docs/families/invariant_bound.py have the eigenvalues of the whole matrix?
 
     python tests/independent/invariant_blocks.py 9 3
     python tests/independent/invariant_blocks.py 10 3
 
-For a few cells the graph of all tags is small. A random matrix with one value for each variable of the program is written down in
-full, from words and their distances alone, and its eigenvalues are compared with those of the blocks. Conflicts are compared too.
-10 cells are no tag, but three cycles and a centre. Needs numpy, scipy, clarabel.
+For a few cells the graph of all tags is small. A random matrix with one value for each variable of the program is built
+in full from words and their distances, and its eigenvalues are compared with those of the blocks. Conflicts are
+compared, too. Ten cells do not form a tag, but they give three cycles and a centre. Needs numpy, scipy, clarabel.
 """
 import pathlib
 import sys

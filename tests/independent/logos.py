@@ -1,9 +1,9 @@
-"""Logos on pages against their SVG: logos.py DELTILLE FOLDER [SVG...].
+"""Compares logos on pages with their SVG: logos.py DELTILLE FOLDER [SVG...].
 
-Chromium draws each SVG, and what is not white counts as ink; poppler draws the page of a board that carries it, at 1200 dpi.
-Where the description says that the logo lies, both show the same ink: their intersection is at least 0.98 of their union. A
-logo that is turned, in a strip along the right margin, or mirrored, is so too. The tiles of the page are to the byte those of
-the page without a logo.
+Chromium renders each SVG, and pixels that are not white count as ink. Poppler renders the page of a board with the logo
+at 1200 dpi. At the stated position of the logo, both must show the same ink: their intersection is at least 0.98 of
+their union. The same must apply to a logo rotated in a strip along the right margin, and to a mirrored logo. The tiles
+of the page must be byte-identical to those of the page without a logo.
 
 Needs chromium ($CHROMIUM), pdftoppm, numpy, Pillow.
 """
@@ -69,7 +69,7 @@ def drawn_by_chromium(svg, folder):
 
 
 def shrunk(ink):
-    """Pixels with ink on all sides: what is light but not white."""
+    """Pixels with ink 2 px away on all four sides, which excludes edge pixels that are light but not white."""
     inside = ink.copy()
     for axis in (0, 1):
         for way in (-2, 2):
@@ -83,7 +83,7 @@ def cut(ink):
 
 
 def printed(pdf, sheet, place, width_mm, is_mirrored, folder):
-    """The ink of a page where the logo lies, as it is seen."""
+    """The ink of a page at the position of the logo, upright."""
     scale = DPI / 25.4
     turn = place["angle_rad"]
     x, y = place["at_mm"]

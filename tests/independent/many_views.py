@@ -1,8 +1,9 @@
 """Detections of very many views, to measure how long a calibration takes: many_views.py FOLDER VIEWS
 [ROWS COLS OFF_MM].
 
-A board of 10 × 11 corners, 20 mm apart, or of others over 220 mm that are off their places, before a camera of 1600 ×
-1200 px with a mild lens; the corners have noise of 0.05 px. Then, for time and memory:
+A board of 10 × 11 corners, 20 mm apart, in front of a camera of 1600 × 1200 px with weak distortion; with ROWS, COLS
+and OFF_MM, a board of 220 mm with randomly displaced corners. The corner noise is 0.05 px. Time and memory are measured
+with:
 
     /usr/bin/time -v deltille calibrate FOLDER --grid checker --rows 10 --cols 11 --edge 20mm --model radtan5 -o OUT
 """
@@ -20,7 +21,7 @@ NOISE_PX, MARGIN_PX = 0.05, 10.0
 
 
 def rotation(turn):
-    """The matrix of a turn about a vector, by as many radians as it is long (Rodrigues)."""
+    """The rotation matrix of a rotation vector, in radians (Rodrigues)."""
     angle = np.linalg.norm(turn)
     x, y, z = turn / angle
     k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -37,7 +38,7 @@ def project(points):
 
 
 def view(random, board):
-    """The corners of a view that shows all of the board."""
+    """The corners of a view that shows the whole board."""
     while True:
         turn = random.uniform([-0.7, -0.7, -0.5], [0.7, 0.7, 0.5]) + 1e-9
         place = random.uniform([-180, -130, 280], [180, 130, 600])

@@ -1,16 +1,16 @@
 """Damaged artifacts, read by other programs: mutants.py DELTILLE FOLDER [MUTANTS [SEED]].
 
-Makes a board, a ChArUco board and a tetrahedron in FOLDER in all formats that are text or hold text, and then MUTANTS
-times (60 unless said) for each file deletes, doubles, moves or replaces a token: a bracket, quote, comma, tag, word,
-number or line end. `deltille verify` must refuse the mutant, or an independent reader must read of it what it reads of
-the original: the same structure, and numbers within the tolerance that docs/formats.md states.
+Makes a board, a ChArUco board and a tetrahedron in FOLDER in all formats that are or contain text. Then, MUTANTS times
+for each file (60 by default), it deletes, doubles, moves or replaces a token: a bracket, quote, comma, tag, word,
+number or line end. `deltille verify` must reject the mutant, or an independent reader must read the same content from
+it as from the original: the same structure, and numbers within the tolerance that docs/formats.md states.
 
 - XML (SVG, SDF, URDF, MuJoCo, 3MF): lxml, in canonical form without comments;
-- USDA: usd-core, as it exports what it opened; OBJ and MTL: trimesh; glTF: json without doubled keys;
+- USDA: usd-core, by exporting the opened file; OBJ and MTL: trimesh; glTF: json without duplicate keys;
 - DXF: ezdxf; STL: trimesh; .dsc: its lines.
 
-Ends with an error for the first that is neither, and for a verification that needs more than 5 s of CPU or 1 GB.
-Needs usd-core, trimesh, lxml, ezdxf and pillow.
+Ends with an error at the first mutant that satisfies neither condition, or if a verification needs more than 5 s of CPU
+time or 1 GB. Needs usd-core, trimesh, lxml, ezdxf and pillow.
 """
 
 import collections
@@ -33,7 +33,7 @@ from pxr import Tf, Usd
 
 TOKENS = re.compile(r'[-+]?\d+(?:\.\d+)?|\w+|</?|/?>|\s+|.', re.S)
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?$")
-# Positions may be 0.05 mm off, in files of metres as many thousandths.
+# Positions may be off by 0.05 mm, which is 5e-5 in files in metres.
 MM, METRES = 0.06, 6e-5
 MAX_SECONDS, MAX_KB = 5.0, 1_000_000
 
@@ -48,7 +48,7 @@ MADE = [
 def mutant(text, pick):
     """The text with one token changed."""
     tokens = TOKENS.findall(text)
-    # As many of the short kinds as of the numbers, of which there are most.
+    # Rare kinds of tokens are chosen as often as numbers, the most frequent kind.
     kinds = collections.defaultdict(list)
     for index, token in enumerate(tokens):
         kinds["n" if NUMBER.match(token) else "w" if token.isalpha() else token.strip() or " "].append(index)
@@ -83,7 +83,7 @@ def usd(path):
 
 
 def mesh(path):
-    # As it is written: without merging, which depends on rounding.
+    # Without merging vertices, because merging depends on rounding.
     scene = trimesh.load(path, force="scene", process=False)
     parts = [(m.vertices.tolist(), m.faces.tolist(), m.visual.uv.tolist()) for m in scene.geometry.values()]
     images = [m.visual.material.image for m in scene.geometry.values()]
@@ -107,8 +107,8 @@ def drawing(text):
 
 
 def same(one, other, tolerance):
-    """Whether two texts have the same words, and numbers within the tolerance; any version may have written them, and
-    ids of paths of an SVG are anything."""
+    """Whether two texts have the same words, and numbers within the tolerance; the version of the program and the ids
+    of paths in an SVG are ignored."""
     free = lambda text: re.sub(r'deltille [\d.]+|<path[^>]* id="[^"]*"', lambda found: re.sub(r'deltille [\d.]+| id="[^"]*"', "", found[0]), text)
     split = lambda text: re.findall(r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?|[^\s\d]+", free(text))
     one, other = split(one), split(other)
@@ -117,7 +117,7 @@ def same(one, other, tolerance):
 
 
 def repacked(parts):
-    """A ZIP of parts, of no date."""
+    """A ZIP of parts, without dates."""
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w") as file:
         for name, text in parts:
@@ -127,7 +127,7 @@ def repacked(parts):
 
 
 class Format:
-    """How a file is taken apart, put together, and read by others."""
+    """The functions that unpack a file, pack it, and read it with another program."""
 
     def __init__(self, path):
         self.path, self.data = path, path.read_bytes()

@@ -1,9 +1,10 @@
-"""Pictures without a board, of which none may be taken for one: no_board.py DELTILLE FOLDER [COUNT [SEED]].
+"""Images without a board, in which no board may be detected: no_board.py DELTILLE FOLDER [COUNT [SEED]].
 
-Writes COUNT pictures of 480 × 360 px in FOLDER, of kinds by turns: textures, gratings and their moirés, screens, ordered
-dithers, text, cells, leaves, mosaics, gradients, and parts of the photographs in scikit-image, scikit-learn and matplotlib,
-as they are and in black and white. Then `deltille detect` looks for untagged grids of both tilings and of no known size. It
-prints what was found, and of what kinds. Needs numpy, scipy and pillow; packages of photographs that are missing are named.
+Writes COUNT pictures of 480 × 360 px in FOLDER, of alternating kinds: textures, gratings and their moirés, screens,
+ordered dithers, text, cells, leaves, mosaics, gradients, and parts of the photographs in scikit-image, scikit-learn and
+matplotlib, as they are and in black and white. Then `deltille detect` searches for untagged grids of both tilings and
+of unknown size. The script prints the false detections and the kinds of their images. Needs numpy, scipy and pillow;
+missing packages of photographs are reported.
 """
 
 import json
@@ -19,7 +20,7 @@ WIDTH, HEIGHT = 480, 360
 
 
 def plane(random):
-    """Coordinates that are turned, moved and seen in perspective, px."""
+    """Coordinates after a random rotation, translation and perspective distortion, px."""
     y, x = np.mgrid[:HEIGHT, :WIDTH].astype(float)
     x, y = x - WIDTH / 2, y - HEIGHT / 2
     depth = 1 + (x * random.uniform(-1, 1) + y * random.uniform(-1, 1)) / WIDTH * 0.8
@@ -56,14 +57,14 @@ def grating(random):
 
 
 def moire(random):
-    """Two gratings that lie on each other as two sheets of film do."""
+    """Two superimposed gratings, like two sheets of film."""
     (u, _), (s, _) = plane(random), plane(random)
     first, second = random.uniform(4, 20, 2)
     return (np.sin(2 * np.pi * u / first) > 0) * (np.sin(2 * np.pi * s / second) > 0) * 1.0
 
 
 def screen(random):
-    """A gradient in dots of round, elliptic or line shape; of a grey that changes, so that dots meet in places only."""
+    """A gradient in dots of round, elliptic or line shape; the grey changes, so dots meet only in some regions."""
     u, v = plane(random)
     period = random.uniform(5, 30)
     a, b = np.cos(2 * np.pi * u / period), np.cos(2 * np.pi * v / period)
@@ -142,7 +143,7 @@ def gradient(random):
 
 
 def photographs():
-    """Pictures that Python packages bring along."""
+    """Images that are part of Python packages."""
     found = []
     try:
         import skimage.data
@@ -165,7 +166,7 @@ def photographs():
         print("matplotlib is missing")
     images = []
     for path in found:
-        # What scikit-image tests checkerboards with is one.
+        # The chessboard image of scikit-image shows a checkerboard.
         if "chessboard" in path.name:
             continue
         try:

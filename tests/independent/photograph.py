@@ -1,11 +1,12 @@
-"""Photographs of printed pages by cairo and numpy, to judge the detector by something that owes it nothing.
+"""Photographs of printed pages, rendered by cairo and numpy, for tests of the detector that are independent of
+deltille's code.
 
     page = Page("board.json")                      # board.pdf beside it, drawn by pdftocairo
     image, truth = photograph(page, Scene(tilt_deg=45, tone="srgb"), seed=3)
 
-Of deltille only the PDF is used, and the places of corners on the page that the target states. The page
-is looked at through a pinhole from many points of every pixel, blurred between the pixels, and only then
-averaged over them: a blur that acts on pixels would be another one.
+Only two outputs of deltille are used: the PDF, and the corner positions on the page that the target states. The page is
+sampled through a pinhole at many points of every pixel, blurred at this higher resolution, and only then averaged over
+pixels, because a blur of whole pixels would be a different blur.
 """
 
 import hashlib
@@ -62,7 +63,7 @@ class Page:
         return cv2.imread(str(png), cv2.IMREAD_GRAYSCALE).astype(np.float32) / 255
 
     def reduced_by(self, n, ink_um=0.0):
-        """The page with n × n pixels in one, what is dark grown by so much on every side."""
+        """The page with n × n pixels averaged into one, after dilating dark areas by this amount on every side."""
         if (n, ink_um) not in self.reduced:
             page = self.drawn(ink_um)
             height, width = (side // n for side in page.shape)
@@ -73,9 +74,9 @@ class Page:
 
 def with_ink(pdf, ink_um):
     """The bytes of a PDF with every dark path grown on all sides, by a stroke in its own colour; or shrunk by
-    a white one. Its table of objects is left as it was: readers make it anew."""
+    a white one. Its cross-reference table is not updated: readers rebuild it."""
     stroke = b"/Exact gs 0 0 0 %d K %.5f w 1 j\n" % (ink_um > 0, 2 * abs(ink_um) / 1000 * 72 / 25.4)
-    # Lines are moved to whole pixels otherwise.
+    # Otherwise, lines are snapped to whole pixels.
     resources = b"/Resources<</ExtGState<</Exact<</SA false>>>>>>"
     pdf = re.sub(rb"/Resources \d+ 0 R", resources, pdf)
 
@@ -83,7 +84,7 @@ def with_ink(pdf, ink_um):
         content = zlib.decompress(stream[3])
         if b"f*" not in content:
             return stream[0]
-        # Fills close what strokes leave open.
+        # Fills cover the gaps that the strokes leave.
         content = content.replace(b"0 0 0 1 K\n", b"")
         content = re.sub(rb"( [lc]\n)([-\d. ]+ m\n)", rb"\1h\n\2", content)
         content = zlib.compress(stroke + re.sub(rb"(?m)^f\*$", b"b*", content))
@@ -95,7 +96,7 @@ def with_ink(pdf, ink_um):
 
 @dataclass
 class Scene:
-    """What is photographed, and how. Light and noise are parts of full scale."""
+    """The settings of a photograph. Light and noise are fractions of full scale."""
 
     width: int = 1280
     height: int = 960
@@ -116,7 +117,7 @@ class Scene:
 
 
 def tone_curve(name, light):
-    """Grey values of linear light."""
+    """Grey values for linear light."""
     light = np.clip(light, 0, 1)
     if name == "linear":
         return light
@@ -129,7 +130,8 @@ def tone_curve(name, light):
 
 
 class View:
-    """A pinhole before the page, turned at random, with the board's middle near the picture's."""
+    """A pinhole camera in front of the page, with a random rotation and the centre of the board near the image
+    centre."""
 
     def __init__(self, page, scene, rng):
         self.scene, corners = scene, page.corners_mm
@@ -154,13 +156,13 @@ class View:
         return np.array([self.scene.width - 1, self.scene.height - 1]) / 2
 
     def project(self, page_mm):
-        """Pixels of places on the page."""
+        """Pixels of positions on the page."""
         flat = np.c_[page_mm - self.centre, np.zeros(len(page_mm))]
         at = flat @ self.rotation.T + self.translation
         return self.scene.focal_px * at[:, :2] / at[:, 2:] + self.middle()
 
     def page_mm(self, x, y):
-        """Where the rays through pixels meet the page; NaN behind the camera."""
+        """The page positions of pixels; NaN behind the camera."""
         cx, cy = self.middle()
         ray = np.stack([(x - cx) / self.scene.focal_px, (y - cy) / self.scene.focal_px, np.ones_like(x)])
         ray = np.tensordot(self.rotation.T, ray, 1)
@@ -171,7 +173,7 @@ class View:
 
 
 def bilinear(image, x, y):
-    """Samples of an image, and whether they lie in it."""
+    """Bilinear samples of an image, and a flag for positions inside it."""
     height, width = image.shape
     inside = (x >= 0) & (y >= 0) & (x < width - 1) & (y < height - 1)
     x, y = np.where(inside, x, 0), np.where(inside, y, 0)
@@ -184,7 +186,7 @@ def bilinear(image, x, y):
 
 
 def look(page, view, scene):
-    """The reflectance seen by each pixel under the blur; around the page it is 0.25."""
+    """The blurred reflectance at each pixel; it is 0.25 outside the page."""
     steps = 4 if scene.tilt_deg <= 20 else 6 if scene.tilt_deg <= 50 else 9
     n = int(np.clip(round(PX_PER_MM / (view.px_per_mm * steps)), 1, 24))
     drawn = page.reduced_by(n, scene.ink_um)
@@ -204,7 +206,7 @@ def look(page, view, scene):
 
 
 def moved(image, length_px, angle):
-    """The image under a straight motion."""
+    """The image with linear motion blur."""
     reach, fine = math.ceil(length_px / 2) + 1, 8
     side = (2 * reach + 1) * fine
     kernel = np.zeros((side, side))
@@ -217,7 +219,7 @@ def moved(image, length_px, angle):
 
 
 def demosaiced(light, noise, tone, rng):
-    """Grey of a Bayer sensor whose colours see different parts of the light."""
+    """Grey values from a Bayer sensor whose filters transmit different fractions of the light."""
     gains = np.array([0.7, 1.0, 0.6])
     raw = light.copy()
     raw[0::2, 0::2] *= gains[0]
@@ -228,7 +230,7 @@ def demosaiced(light, noise, tone, rng):
 
 
 def photograph(page, scene, seed):
-    """An 8-bit picture, and the places of the page's corners in it."""
+    """An 8-bit image, and the positions of the page's corners in it."""
     rng = np.random.default_rng(seed)
     view = View(page, scene, rng)
     truth = view.project(page.corners_mm)

@@ -1,10 +1,11 @@
-"""Models for simulators, opened by what simulates: simulators.py DELTILLE FOLDER.
+"""Models for simulators, opened by the simulators: simulators.py DELTILLE FOLDER.
 
 Makes boards, one with two sides, a ChArUco board, an AprilGrid, an icosahedron, a cube, a cuboid, a cuboctahedron of triangles and squares, and a ball of 320 faces
 with four textures in FOLDER, and then
 
-- MuJoCo renders each from a ring of cameras, `deltille detect` reads the pictures, and the corners must be where MuJoCo's
-  camera puts those of the description: of those on faces that are seen within 60° at least 95 %;
+- MuJoCo renders each model from a ring of cameras, and `deltille detect` reads the images. The corners must be at the
+  positions to which MuJoCo's camera projects those of the description: at least 95 % of the corners on faces seen
+  within 60°;
 - trimesh loads the OBJ and the glTF with all their materials, usd-core the USD with the subsets of its faces; corners of the description must lie on
   their surfaces within 0.05 mm, and be corners of the texture there, as OpenCV refines them, within 0.05 mm or 0.15 px;
 - yourdfpy loads the URDF, and the elements of the SDF are read by Python.
@@ -27,16 +28,16 @@ from PIL import Image
 from pxr import Usd, UsdGeom, UsdShade
 
 WIDTH, HEIGHT, FIELD_DEG = 1600, 1200, 40.0
-# Pictures of the ball, of whose 320 faces half are seen at a time.
+# Images of the ball; each shows half of its 320 faces.
 LARGE = 2600
 VIEWS = 8
 SEEN_DEG, SHARE, PLACE_MM = 60.0, 0.95, 0.05
-# Where a texture has fewer px a mm than this, its corners may be off by 0.15 px.
+# Corners of a texture with fewer px/mm than this may be off by 0.15 px.
 COARSE = 3.0
 
 
 def corners_of(target):
-    """Places and normals of all corners, mm, by panel and id."""
+    """Positions and normals of all corners, mm, by panel and id."""
     found = {}
     for panel in target["panels"]:
         normal = np.array(panel["pose"]["rotation"]).reshape(3, 3)[:, 2]
@@ -54,7 +55,7 @@ def looking(eye, at):
 
 
 def rendered(folder, name, target, corners, width, height):
-    """Pictures by MuJoCo, and for each the pixels of the corners that are seen well."""
+    """Images by MuJoCo, and for each image the pixels of the clearly visible corners."""
     spec = mujoco.MjSpec.from_file(str(folder / f"{name}.xml"))
     spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
     spec.visual.headlight.ambient = [0.5] * 3
@@ -70,7 +71,7 @@ def rendered(folder, name, target, corners, width, height):
         if sides <= 2:
             tilt = np.radians(12 + 6 * k)
             aside = [np.sin(tilt) * np.cos(angle), np.sin(tilt) * np.sin(angle), np.cos(tilt)]
-            # Before the front, which OpenCV has at −z, or every second time before the back.
+            # In front of the front side, which is at −z in OpenCV's frame, or every second time in front of the back.
             aside[2] *= fronts[k % sides]
         else:
             aside = [np.cos(angle), np.sin(angle), 0.8 * np.sin(2 * angle)]
@@ -117,12 +118,12 @@ def detected(program, folder, name, shown):
     off = np.array(off)
     print(f"{name}: MuJoCo: {found} of {wanted} corners seen within {SEEN_DEG:.0f}°, off by {np.median(off):.3f} px in the "
           f"median, {off.max():.3f} at most")
-    # MuJoCo does not smooth edges: along rows and columns of pixels they are off by up to half a pixel each.
+    # MuJoCo does not anti-alias edges: along rows and columns of pixels, each edge is off by up to half a pixel.
     assert found >= SHARE * wanted and off.max() < np.sqrt(0.5)
 
 
 def on_surface(name, what, vertices, faces, uv, of_texture, textures, corners):
-    """How far corners are from a mesh, mm, and from the corners of its textures, of which each face has one."""
+    """Distances of corners from a mesh, mm, and from the corners of its textures; each face has one texture."""
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     places = np.array([place for place, _ in corners.values()])
     nearest, apart, triangle = trimesh.proximity.closest_point_naive(mesh, places)
@@ -150,7 +151,8 @@ def texture_names(name, count):
 
 
 def by_material(folder, name, ending, count):
-    """The parts of a mesh as trimesh loads them, by their material, whose pictures must be those of the files."""
+    """The parts of a mesh as trimesh loads them, by their material; the images of the materials must be those of the
+    files."""
     scene = trimesh.load(folder / f"{name}.{ending}", process=False, force="scene")
     parts = {part.visual.material.name: part for part in scene.geometry.values()}
     names = ["print"] if count == 1 else [f"print-{i + 1}" for i in range(count)]

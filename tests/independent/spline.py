@@ -1,9 +1,9 @@
-"""A spline's projection, by SciPy's B-splines, and by mrcal where that is installed.
+"""Checks the projection of a spline lens with SciPy's B-splines, and with mrcal if it is installed.
 
     spline.py <deltille> <folder>
 
-The folder has board.json and corners/, as `.ci/run` makes them. Calibrates with splines of both degrees and compares
-where the written camera files have corners with where the calibration says they are.
+The folder has board.json and corners/, as `.ci/run` makes them. Calibrates with splines of both degrees. The corners
+projected with the written camera files must match the positions in the calibration.
 """
 
 import json
@@ -18,7 +18,7 @@ deltille, folder = sys.argv[1:]
 
 
 def project(camera, points):
-    """Pixels of points of the camera frame, n x 3, and whether the spline is determined there."""
+    """Pixels of points in the camera frame, n × 3, and a flag for points where the spline is determined."""
     grid = camera["spline"]
     degree, columns, rows = grid["degree"], grid["columns"], grid["rows"]
     h = 4 * numpy.tan(numpy.radians(grid["fov_x_deg"]) / 4) / (columns - degree)

@@ -1,10 +1,10 @@
-"""Tables of detections in other programs, and cameras from what these write.
+"""Detection tables in other programs, and cameras calibrated from the tables that these programs write.
 
     python tables.py path/to/deltille FOLDER
 
 makes a board and views of it in FOLDER, and detections of these as JSON and as Parquet. pyarrow, DuckDB and Polars read
-the tables, whose numbers must be those of the JSON to the last bit, and write them anew; from all of them `deltille
-calibrate` must make the same camera. Programs that are not there are named and left out.
+the tables, whose numbers must equal those of the JSON to the last bit, and write them again. `deltille calibrate` must
+compute the same camera from all of them. Programs that are not installed are reported and skipped.
 """
 
 import json
@@ -26,7 +26,7 @@ def run(*command):
 def shuffled_by_pandas(source, to):
     import pandas
 
-    # Rows in another order, and labels as floating-point numbers, as some write them where values are missing.
+    # Rows in another order, and labels as floating-point numbers, which some programs write if values are missing.
     frame = pandas.read_parquet(source).sample(frac=1, random_state=3)
     if "panel" in frame:
         frame = frame.astype({"panel": float, "id": float})

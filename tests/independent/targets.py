@@ -1,7 +1,7 @@
-"""Several targets in one picture: targets.py PROGRAM FOLDER.
+"""Several targets in one image: targets.py PROGRAM FOLDER.
 
-Pages drawn by cairo are put into one picture by numpy; what `deltille detect` finds of all at once is held against the
-places on the pages and against what it finds of each by itself.
+Pages rendered by cairo are combined into one image with numpy. The detections of all targets together are compared with
+the positions on the pages and with the detections of each target alone.
 """
 
 import json
@@ -30,14 +30,14 @@ def run(*arguments):
 
 
 def picture(rng):
-    """A picture of all boards, and where their corners are in it, by name."""
+    """An image of all boards, and the positions of their corners in it, by name."""
     image, truth = np.full(SIZE[::-1], 0.55, np.float32), {}
     for index, name in enumerate(BOARDS):
         page = Page(folder / f"{name}.json")
         sheet = page.reduced_by(REDUCED)
         height, width = sheet.shape
         corners = np.float32([[0, 0], [width, 0], [width, height], [0, height]])
-        # A quarter of the picture each, a little turned and tilted.
+        # Each board fills a quarter of the image, slightly rotated and tilted.
         middle = np.array([SIZE[0] * (0.27 + 0.46 * (index % 2)), SIZE[1] * (0.26 + 0.48 * (index // 2))])
         turn = cv2.getRotationMatrix2D((0, 0), rng.uniform(-12, 12), 620 / max(width, height))[:, :2]
         places = (corners - [width / 2, height / 2]) @ turn.T + middle + rng.uniform(-18, 18, (4, 2))

@@ -1,8 +1,8 @@
-"""Undistorted and rectified pictures against OpenCV: undistort.py PROGRAM FOLDER.
+"""Compares undistorted and rectified images with OpenCV: undistort.py PROGRAM FOLDER.
 
-The folder has board.json, camera.yaml, camera.json and photos of a calibrated camera. Maps are held against those of OpenCV;
-corners of undistorted photos against lines, by numpy; rectified pictures of a simulated pair against cv2.stereoRectify
-and, by their disparities, against the board.
+The folder has board.json, camera.yaml, camera.json and photos of a calibrated camera. Maps are compared with those of
+OpenCV, corners of undistorted photos with straight lines fitted by numpy, and rectified images of a simulated pair with
+cv2.stereoRectify and, through their disparities, with the board.
 """
 
 import json
@@ -29,7 +29,7 @@ def lens(found):
 
 
 def off_plane(path):
-    """How far, px rms a coordinate, corners are from where a homography has them, as of an ideal camera."""
+    """RMS distance of corners from a homography, px per coordinate, as for an ideal pinhole camera."""
     seen = [c for grid in json.loads(path.read_text())["grids"] for c in grid["corners"]]
     at = {(c["row"], c["col"]): c["target_mm"][:2] for c in board["panels"][0]["corners"]}
     plan = np.float64([at[c["row"], c["col"]] for c in seen])
@@ -73,7 +73,7 @@ run("undistort", "--camera", folder / "camera.yaml", folder / "deep.png", "-o", 
 deep = cv2.imread(str(folder / "deep" / "deep-undistorted.png"), cv2.IMREAD_UNCHANGED)
 assert deep.dtype == np.uint16 and deep.shape == colours.shape
 
-# A pair: the second camera 90 mm to the right, turned a little.
+# A pair: the second camera is 90 mm to the right and slightly rotated.
 rng = np.random.default_rng(3)
 turn, shift = cv2.Rodrigues(np.array([0.02, -0.06, 0.03]))[0], np.array([-90.0, 4.0, 6.0])
 for index in range(12):
@@ -105,7 +105,7 @@ storage = cv2.FileStorage(str(pair / "left-right-opencv.yaml"), cv2.FILE_STORAGE
 ours = {name: storage.getNode(name).mat() for name in ("R1", "R2", "P1", "P2", "Q")}
 baseline = ours["P2"][0, 3] / ours["P2"][0, 0]
 assert abs(baseline + np.linalg.norm(translation)) < 1e-9
-# The same relative turn; around the baseline both are free.
+# The same relative rotation; the rotation of the pair about the baseline is arbitrary.
 assert np.allclose(ours["R2"] @ rotation @ ours["R1"].T, np.eye(3), atol=1e-12)
 assert np.allclose(r2 @ rotation @ r1.T, np.eye(3), atol=1e-9)
 for name, (matrix, distortion), r, p in (

@@ -2,9 +2,9 @@
 
     python viewers.py path/to/deltille path/to/deltag FOLDER
 
-writes boards, a net and a sheet of tags to FOLDER as PDF, SVG and PNG, draws the PDF with poppler and with
-pdfium (the engine of Chromium's viewer, by pypdfium2), the SVG with Chromium, and compares every pixel with the
-PNG. Needs numpy and Pillow; a program that is not there is said to be missing and left out.
+writes boards, a net and a sheet of tags to FOLDER as PDF, SVG and PNG. It renders the PDF with poppler and pdfium (the
+engine of Chromium's viewer, through pypdfium2) and the SVG with Chromium, and compares every pixel with the PNG. Needs
+numpy and Pillow; programs that are not installed are reported and skipped.
 """
 
 import math
@@ -20,11 +20,11 @@ Image.MAX_IMAGE_PIXELS = None
 
 DPI = 300
 
-# Programs cover a pixel that an edge crosses in their own ways: by 16 samples or 256, or by area. So no pixel counts
-# alone where there is an edge within EDGE_PX; there the mean over a square of that radius may differ as of an edge
-# that is so many pixels off. Cairo, by which poppler draws, keeps to the page; Chromium lays it out in whole pixels
-# of 1/96 inch and stretches it to them by less than one; pdfium draws rectangles to whole pixels, outwards.
-# Everywhere else there is paper or ink, and no more than rounding may differ.
+# Programs compute the coverage of a pixel on an edge differently: with 16 or 256 samples, or by area. Single pixels
+# within EDGE_PX of an edge are therefore not compared. Instead, the mean over a square of that radius may differ by the
+# effect of an edge displaced by the allowed number of pixels. Cairo, the renderer of poppler, draws at the exact page
+# size. Chromium lays the page out in whole pixels of 1/96 inch and stretches it by less than one of them. Pdfium
+# extends rectangles outwards to whole pixels. All other pixels are paper or ink, and may differ only by rounding.
 EDGE_PX = 2
 MAX_AT_EDGES = {name: px / (2 * EDGE_PX + 1) for name, px in (("poppler", 0.2), ("chromium", 0.67), ("pdfium", 2.0))}
 MAX_ELSEWHERE = 2 / 255
@@ -41,13 +41,14 @@ TARGETS = {
 
 
 def read(path):
-    """Ink of a picture, 0 on paper to 1: the darkest pixel is ink, as pure K is not quite black on screen."""
+    """Ink of an image, from 0 (paper) to 1: the darkest pixel counts as full ink, because pure K is not quite black on
+    screen."""
     grey = np.asarray(Image.open(path).convert("L"), dtype=np.float32)
     return (grey.max() - grey) / max(float(grey.max() - grey.min()), 1.0)
 
 
 def around(picture, combine):
-    """Combines each pixel with those at most EDGE_PX away."""
+    """Combines each pixel with those within EDGE_PX."""
     for axis in (0, 1):
         padded = np.pad(picture, [(EDGE_PX, EDGE_PX) if a == axis else (0, 0) for a in (0, 1)], "edge")
         size = picture.shape[axis]
@@ -60,7 +61,7 @@ def around(picture, combine):
 
 
 def compare(ours, theirs, most_at_edges):
-    """The largest difference elsewhere and at edges, each a part of what is allowed."""
+    """The largest differences away from edges and at edges, as fractions of the tolerances."""
     assert ours.shape == theirs.shape, f"{theirs.shape} px instead of {ours.shape}"
     least, most = around(ours, np.minimum), around(ours, np.maximum)
     flat = most - least < MAX_ELSEWHERE
@@ -88,14 +89,14 @@ def pdfium(pdf, page, size, dpi, out):
 
 
 def whole(picture, size):
-    """The page from its upper left corner, on paper: programs round its size up, or down."""
+    """The page from its upper left corner, padded with paper: programs round its size up or down."""
     page = Image.new("L", size, 255)
     page.paste(picture, (0, 0))
     return page
 
 
 def chromium(svg, size, dpi, out):
-    # Lengths in mm are laid out at 96 pixels an inch, and drawn at so many times as many.
+    # Lengths in mm are laid out at 96 pixels per inch, and rendered at this multiple of that resolution.
     scale = dpi / 96
     window = [math.ceil(side / scale) + 1 for side in size]
     program = next(filter(shutil.which, CHROMIUM))
@@ -106,7 +107,7 @@ def chromium(svg, size, dpi, out):
 
 
 def viewers():
-    """Those that are here, by name: what they draw, and how."""
+    """The installed viewers by name, with the format and the function that renders it."""
     found = {}
     if shutil.which("pdftocairo"):
         found["poppler"] = ("pdf", poppler)

@@ -1,13 +1,15 @@
-//! Chapters of the source: modules import each other in one direction.
+//! Structure of the source: modules have no circular imports, and `docs/architecture.md` names only
+//! existing modules.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
-/// A module, or what is in it, by the names that lead to it.
+/// The path of a module or of an item in it, name by name.
 type Module = Vec<String>;
 
-/// Sources in which no module imports another in a circle, also through what a `mod.rs` or `lib.rs` names of its modules.
+/// Sources without circular imports between modules, including imports through the re-exports of a
+/// `mod.rs` or `lib.rs`.
 const SOURCES: [&str; 12] = [
     "crates/calibrate/src",
     "crates/cli/src",
@@ -24,7 +26,7 @@ const SOURCES: [&str; 12] = [
 ];
 
 #[test]
-fn modules_do_not_import_in_a_circle() {
+fn modules_have_no_circular_imports() {
     for source in SOURCES {
         let source = Path::new(crate::common::REPOSITORY).join(source);
         let (mut texts, mut heads) = (BTreeMap::new(), BTreeMap::new());
@@ -46,8 +48,8 @@ fn modules_do_not_import_in_a_circle() {
     }
 }
 
-/// The text of all modules below a folder, without comments and tests; that of `mod.rs` and `lib.rs`, which list what is
-/// beside them, as `heads`.
+/// Collects the text of all modules below a folder, without comments and tests. The texts of
+/// `mod.rs` and `lib.rs`, which re-export items of their submodules, go to `heads`.
 fn collect(
     folder: &Path,
     module: &Module,
@@ -73,7 +75,7 @@ fn collect(
     }
 }
 
-/// What heads name, by where it can be named, and where it is.
+/// The items that heads re-export: their public path, and the path of their definition.
 fn reexported(
     heads: &BTreeMap<Module, String>,
     texts: &BTreeMap<Module, String>,
@@ -88,7 +90,7 @@ fn reexported(
             let Some(place) = absolute(folder, &path) else { continue };
             let Some(last) = place.last() else { continue };
             let name: Module = folder.iter().chain([last]).cloned().collect();
-            // A function may be called like the module that it is in.
+            // A function may have the name of the module that defines it.
             if !place.starts_with(&name) {
                 names.insert(name, place);
             }
@@ -97,7 +99,7 @@ fn reexported(
     names
 }
 
-/// A path from `crate`, `self` or `super` in a module by all its names.
+/// The absolute path for a path from `crate`, `self` or `super` in a module.
 fn absolute(module: &Module, path: &str) -> Option<Module> {
     let mut names = path.split("::").filter(|name| !name.is_empty());
     let base = match names.next()? {
@@ -109,7 +111,8 @@ fn absolute(module: &Module, path: &str) -> Option<Module> {
     Some(base.iter().cloned().chain(names.map(str::to_owned)).collect())
 }
 
-/// The modules that a text names by paths from `crate` or `super`, also where a head names what is in them.
+/// The modules that a text imports by paths from `crate` or `super`, including imports through the
+/// re-exports of a head.
 fn imported(
     module: &Module,
     text: &str,
@@ -136,7 +139,7 @@ fn paths(text: &str) -> Vec<String> {
     for c in text.chars().chain([' ']) {
         match c {
             _ if is_of_path(c) => path.push(c),
-            // Not only groups have braces; what stands before others is no path.
+            // Braces also occur outside groups; the text before those is not a path.
             '{' => {
                 groups.push(if path.ends_with("::") { path.split_off(0) } else { String::new() })
             }
@@ -153,7 +156,7 @@ fn paths(text: &str) -> Vec<String> {
     paths
 }
 
-/// Whether imports lead from a module back to another; `path` is the way.
+/// Whether a chain of imports leads from a module to another; `path` is the chain so far.
 fn circle(
     from: &Module,
     to: &Module,
@@ -175,9 +178,10 @@ fn circle(
 const CRATES: [&str; 9] =
     ["calibrate", "cli", "core", "detect", "files", "lab", "layout", "search", "verify"];
 
-/// Files such as `detect/labels/why.rs`, and modules such as `calibrate::start::consensus` or what is in them.
+/// Files such as `detect/labels/why.rs`, and modules such as `calibrate::start::consensus` or items
+/// in them.
 #[test]
-fn the_architecture_names_what_there_is() {
+fn the_architecture_page_names_only_existing_modules() {
     let root = Path::new(crate::common::REPOSITORY);
     let text = fs::read_to_string(root.join("docs/architecture.md")).unwrap();
     let is_there = |names: &[&str]| {
@@ -194,7 +198,7 @@ fn the_architecture_names_what_there_is() {
             continue;
         }
         count += 1;
-        // A path of names may end in a type or a function, which its module's head may name.
+        // A path may end in a type or a function, which the head of its module may re-export.
         let modules = names.iter().take_while(|name| name.starts_with(char::is_lowercase)).count();
         let is_named = modules < 3 || is_there(&names[..modules - 1]);
         assert!(is_there(&names[..modules]) || !is_path && is_named, "{word}");

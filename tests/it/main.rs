@@ -1,5 +1,6 @@
-//! Whole commands and laws of the library. One program, as linking takes longer than running most of it; a part is run by
-//! its path: `cargo test --release --test it detect::reasons`.
+//! Tests of whole commands and of properties of the library. They are one program, because linking
+//! takes longer than running most of them. The path of a module runs its tests: `cargo test
+//! --release --test it detect::reasons`.
 
 #![allow(unreachable_pub, reason = "tests have no interface")]
 
@@ -13,6 +14,6 @@ mod make;
 mod verify;
 mod vocabulary;
 
-/// Files that are changed so that they keep their form; the fuzz targets share them.
+/// Mutations of files that preserve their format, shared with the fuzz targets.
 #[path = "../../fuzz/src/files/mod.rs"]
 mod changed;

@@ -55,7 +55,7 @@ export function dropZone(take: (files: File[]) => void, ...children: Child[]): H
 
 /** The dropped files, with folders replaced by the files in them. */
 async function filesOf({ items }: DataTransfer): Promise<File[]> {
-  // Read at once: the browser clears the items after the event.
+  // Read synchronously: the browser clears the items after the event.
   const all = [...items].map((item) => ({ file: item.getAsFile(), entry: item.webkitGetAsEntry() }));
   const files = await Promise.all(all.map(({ file, entry }) => (entry?.isDirectory ? within(entry).catch(() => (file ? [file] : [])) : file ? [file] : [])));
   return files.flat();

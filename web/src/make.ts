@@ -309,7 +309,8 @@ export function make(): HTMLElement {
         lines.append(el("li", { class: proof.passed ? "passed" : "refused" }, proof.line, findings.length > 0 ? el("ul", {}, ...findings) : ""));
       } catch (error) {
         if (of !== asked(settings)) return;
-        // A message of the library says why this file does not exist. Without one it crashed, and nothing is verified.
+        // A message of the library says why this file does not exist. If there is no message, the library crashed, and
+        // nothing is verified.
         const reason = error instanceof LibraryError ? error.message : "";
         if (!reason) failed = true;
         lines.append(el("li", { class: reason ? "plain" : "refused" }, `${name}: ${reason || words.failed}`));

@@ -537,7 +537,8 @@ test("figures of families agree with independent computations", async ({ page })
   await cells.nth(5).press("Space");
   await expect(page.getByText("Decoded as tag 0, rotated by 120°, 1 wrong cell corrected.")).toBeVisible();
 
-  // A tag is read as a code that differs from it in few enough cells, whichever were wrong: counted cell by cell.
+  // A tag is read if a code differs from it in few enough cells, regardless of which cells are wrong; the expected
+  // fractions are counted cell by cell.
   const rate = 0.1;
   await page.getByRole("slider", { name: "Wrong cells" }).fill(String(200 * rate));
   const family = JSON.parse(readFileSync(join(root, "crates/core/families/d25h7.json"), "utf8")) as { distance_histogram: Record<string, number>; codes: string[] };

@@ -1,4 +1,5 @@
-//! Ctrl-C and termination signals: a flag that long work checks, and a way out of work that does not.
+//! Ctrl-C and termination signals: a flag that long-running work checks, and a forced exit from
+//! work that does not check it.
 
 use std::borrow::Cow;
 use std::io::Write;

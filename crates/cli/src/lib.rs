@@ -3,7 +3,8 @@
 //! 1. `run`: from the command line to an exit code; `values`: parsers of option values;
 //! 2. `deltag`, `deltille`: the commands;
 //! 3. `wording`: option names in messages; `output`: printed lines and written files;
-//! 4. `progress`, `interrupt`: support for long work; `shell`: completions and manual pages.
+//! 4. `progress`, `interrupt`: support for long-running work; `shell`: completions and manual
+//!    pages.
 
 #![allow(unreachable_pub, reason = "programs have no public interface")]
 #![allow(clippy::missing_errors_doc, reason = "errors of programs are messages for users")]

@@ -48,11 +48,12 @@ pub fn check_writable(option: &str, path: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Exit code if the reader of standard output is gone, as for a program ended by SIGPIPE.
+/// Exit code if the reader of standard output has closed it: the code of a program terminated by
+/// SIGPIPE.
 const UNREAD: i32 = 141;
 
-/// Prints a result. If its reader is gone, such as `head` after enough lines, ends the process silently and removes
-/// partially written files.
+/// Prints a result. If the reader has closed standard output, as `head` does after enough lines,
+/// ends the process silently and removes partially written files.
 pub fn print(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {

@@ -54,7 +54,7 @@ pub fn man<P: CommandFactory>(args: Man) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Writes the page of a command and those of its own commands; how many they are.
+/// Writes the page of a command and those of its subcommands. Returns the number of pages.
 fn pages(
     command: &Command,
     name: &str,

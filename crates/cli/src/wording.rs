@@ -8,7 +8,8 @@ use std::sync::OnceLock;
 use clap::{ArgMatches, Command};
 use deltille::setting::{self, Setting};
 
-/// Returns a command that has the setting, and its option; the option is empty if the command itself is the answer.
+/// Returns a command that has the setting, and its option; the option is empty if the message
+/// should name only the command.
 const fn named(setting: Setting) -> (&'static str, &'static str) {
     match setting {
         Setting::AprilGridGap => ("deltille aprilgrid", "--gap"),

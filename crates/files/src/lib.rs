@@ -4,7 +4,8 @@
 //! | module | purpose |
 //! |---|---|
 //! | [`clock`] | the monotonic clock of the machine |
-//! | [`limits`] | bounds on the size of files that are read; panics and endless work of third-party readers |
+//! | [`limits`] | bounds on the size of files that are read; guards against panics and endless
+//! loops in third-party readers |
 //! | [`family_file`] | families by name or from their files |
 //! | [`target_file`] | targets from their files, with their families |
 //! | [`camera_file`] | cameras from their files |

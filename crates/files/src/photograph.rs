@@ -45,14 +45,14 @@ const PADDING: &str = "Extra bytes between headers";
 /// The marker that ends a JPEG.
 const END_OF_IMAGE: &[u8] = &[0xFF, 0xD9];
 
-/// Number of noise bytes that replace the end of the data: more than any block of pixels has.
+/// Number of noise bytes that replace the end of the data: more than any block of pixels takes.
 const NOISE_BYTES: u32 = 1000;
 
-/// Multipliers that generate noise, with different first bits.
+/// Multipliers that generate noise, with different leading bits.
 const NOISES: [u32; 3] = [0x9E37_79B9, 0x45EB_CA6B, 0xF1BB_CDCB];
 
-/// Number of last bytes whose replacement by noise must change the pixels. The last byte alone may
-/// contain a single bit of the image, which noise may match.
+/// Number of trailing bytes: replacing them with noise must change the pixels. The last byte alone
+/// may contain a single bit of the image, which noise may match.
 const SURPLUS_BYTES: usize = 3;
 
 /// A photograph with the relevant metadata.
@@ -153,7 +153,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<AnyGray, ImageError> {
     read_within(path.as_ref(), &Limits::default())
 }
 
-/// Reads a photograph like [`read`], with other limits than the default.
+/// Reads a photograph like [`read`], with limits other than the default.
 ///
 /// # Errors
 /// Returns an error if the file cannot be read, is not an image, is damaged, or exceeds the limits.

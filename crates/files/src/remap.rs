@@ -1,7 +1,7 @@
 //! Resampling of images through a map of pixels, for example an undistortion. Colours and depth are kept.
 //!
-//! Interpolation is bicubic (Keys 1981). Where the map reduces the image, several samples are averaged to avoid aliasing, up to
-//! a reduction by eight along each axis.
+//! Interpolation is bicubic (Keys 1981). Where the map reduces the image, several samples are
+//! averaged to avoid aliasing, up to a reduction by a factor of eight along each axis.
 
 use image::{DynamicImage, ImageBuffer, Pixel};
 use rayon::prelude::*;

@@ -30,7 +30,7 @@ const SIDE: usize = 41;
 /// Maximum illumination gradient, relative change per pixel: 10 % across 200 px.
 const MAX_SLOPE: f64 = 0.1 / 200.0;
 
-/// Error above which a fit counts as having found something else, px.
+/// Error above which a fit is counted as having converged to something other than the corner, px.
 pub const FAR_PX: f64 = 0.5;
 
 /// Blur, noise and maximum tilt in sweeps that do not vary them.

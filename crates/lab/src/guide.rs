@@ -9,8 +9,9 @@
 //! ```
 //!
 //! Corners are either projected by a known camera and shifted by noise, or every image is rendered and its corners are
-//! detected. The error of a calibration is measured as by `deltille compare`: against the true camera, over the whole
-//! image, at infinity. It is the RMS per axis after the rotation that explains most of the difference.
+//! detected. The error of a calibration is measured as in `deltille compare`: against the true
+//! camera, over the whole image, at infinity. It is the RMS per axis after the rotation that
+//! explains most of the difference.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
@@ -100,7 +101,8 @@ pub struct Worth {
     pub off_px: f64,
     /// The same for points at the median distance of the corners, where a shift of the camera is compensated, too.
     pub error_near_px: f64,
-    /// Uncertainty from noise that the estimate reports over the image at infinity, px, as the same mean.
+    /// Uncertainty due to noise that the estimate reports over the image at infinity, px, RMS per
+    /// axis.
     pub said_px: f64,
     /// Uncertainty that the guide predicted for the last view, px.
     pub expected_px: Option<f64>,
@@ -113,7 +115,7 @@ pub struct Run {
     pub subject: &'static str,
     /// Quality after each guided view, from the first one that permits a calibration.
     pub guided: Vec<Worth>,
-    /// Quality after as many random views as guided ones, and after all.
+    /// Quality after the same number of random views as guided views, and after all random views.
     pub random: Vec<Worth>,
     /// The same for boards that may be cut off by the image border.
     pub cut_off: Vec<Worth>,
@@ -259,7 +261,7 @@ impl World<'_> {
         sd * DVec3::new(x, y, z)
     }
 
-    /// Returns a view of a user who holds the board over an outline by hand.
+    /// Returns the view that results when a user holds the board over an outline by hand.
     fn hand_held(&mut self, next: &NextView, index: usize) -> View {
         let pose = self.over(next);
         loop {
@@ -325,7 +327,8 @@ impl World<'_> {
         }
     }
 
-    /// Returns what is detected of the board at a pose, in a rendered image if images are rendered.
+    /// Returns the corners detected on the board at a pose, from a rendered image if images are
+    /// rendered.
     fn view(&mut self, pose: &Pose, index: usize) -> View {
         let Some((scene, detector)) = self.renderer else { return self.projected(pose, index) };
         let camera = &self.subject.camera;

@@ -38,7 +38,8 @@ const FIELD_RAD: f64 = 0.349_065_850_398_865_9;
 /// Distance of the target from the cameras, and half the distance between the cameras, mm.
 const DISTANCE_MM: f64 = 800.0;
 const BASE_MM: f64 = 250.0;
-/// Range of motion of the target, sideways and in depth, mm: it stays in the field of 280 mm.
+/// Range of motion of the target, sideways and in depth, mm: it stays in the field of view, which
+/// is 280 mm wide.
 const MOVED_MM: [f64; 2] = [12.0, 40.0];
 /// Standard deviations of the position and the orientation of a panel, mm and rad (0.1°).
 const PLACED_MM: f64 = 0.1;
@@ -55,7 +56,7 @@ const QUIET_MM: f64 = 5.0;
 pub struct Setup {
     /// Width of the images, px; the height is three quarters of it.
     pub width: u32,
-    /// Number of frames, at each of which every camera takes an image.
+    /// Number of frames; in each, every camera takes an image.
     pub frames: usize,
     /// Seed of all random choices.
     pub seed: u64,
@@ -169,8 +170,8 @@ impl World {
     }
 }
 
-/// Renders, detects and calibrates; returns `None` if interrupted. `tick` is called after every image, of which there
-/// are two for each camera and frame.
+/// Renders, detects and calibrates; returns `None` if interrupted. `tick` is called after every
+/// image; each camera and frame has two images, one per object.
 ///
 /// # Errors
 /// Returns an error if a target cannot be built, or a calibration fails.
@@ -253,7 +254,7 @@ fn target(object: Object) -> Result<Target, RigExperimentError> {
     }
     let faces: Vec<PanelPose> =
         (0..6).map(|face| cube_face(face, target.panels[face].field_mm())).collect();
-    // Its boards are no longer loose.
+    // Its boards are no longer independent: they have a common frame.
     let spec = TargetSpec::Listed(ListedSpec { format: ListFormat::DscFork });
     let mut cube = target.with_poses(&faces);
     cube.spec = spec;

@@ -51,7 +51,7 @@ const ROW_STEPS: usize = 8;
 /// The fault in the views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scene {
-    /// Nothing.
+    /// No fault.
     Clean,
     /// The focal length changes by 10 %.
     Zoom,

@@ -47,9 +47,9 @@
 //! its stated position in space. The texture of each face is then laid out flat and compared like a sheet: every
 //! tile, every cell of every tag, and no other marks. Models for simulators (`.sdf`, `.urdf`, `.xml` of MuJoCo) must
 //! place that mesh at the target frame; a `.usda` contains it. Two bodies for two-colour printing (`.3mf`) must both
-//! be closed, the black one must fill what the white one leaves free of the plate, and their common surface is
-//! compared like a printed page. A body for printing (`.stl`) must be a closed surface of the stated shape, with its
-//! normals outwards.
+//! be closed, the black one must fill the part of the plate that the white one leaves empty, and
+//! their common surface is compared like a printed page. A body for printing (`.stl`) must be a
+//! closed surface of the stated shape, with its normals outwards.
 //!
 //! Other programs must show the same as the rendering here. The file is therefore inspected before it is rendered,
 //! and every construct that viewers may render differently is a finding: files are checked against a list of

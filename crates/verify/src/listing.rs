@@ -55,8 +55,8 @@ fn unlisted(text: &str) -> Vec<Finding> {
     odd.map(|(index, _)| finding(index).into()).collect()
 }
 
-/// Finds the first line that differs from how its own content would be written: readers parse numbers, and the order
-/// of lines, differently.
+/// Finds the first line that this program would write differently for the same content: readers
+/// parse numbers, and the order of lines, differently.
 fn differently_written(text: &str, listed: &Target) -> Option<Finding> {
     let dialect = Dialect::of(listed);
     let rewritten = dsc::write(listed, dialect).unwrap_or_default();

@@ -61,9 +61,9 @@ impl Verifier<'_> {
         }
     }
 
-    /// Returns verdicts on the sets of pages that `named` gives only in part. If `alone` is set, a single page may be
-    /// named without the others when it can be verified alone; [`set_of`](Self::set_of) always completes the pages of
-    /// a net.
+    /// Returns verdicts on the sets of pages for which `named` lists only some files. If `alone` is
+    /// set, a single page may be named without the others when it can be verified alone;
+    /// [`set_of`](Self::set_of) always completes the pages of a net.
     pub fn incomplete_sets(&self, named: &[PathBuf], alone: bool) -> Vec<Verdict> {
         // Several paths may name the same folder.
         let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());

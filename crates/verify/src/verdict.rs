@@ -200,7 +200,7 @@ impl Verdict {
         self
     }
 
-    /// Writes how many corners and tags the surfaces show.
+    /// Writes the numbers of corners and tags on the surfaces.
     fn corners_and_tags(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let sum = |count: fn(&SheetVerdict) -> usize| self.sheets.iter().map(count).sum::<usize>();
         let deviation = self.sheets.iter().map(|s| s.max_deviation_mm).fold(0.0, f64::max);
@@ -248,7 +248,7 @@ impl fmt::Display for InlayVerdict {
 }
 
 impl fmt::Display for Verdict {
-    /// Writes one line: what was verified, or what is wrong.
+    /// Writes one line that lists the verified items or the findings.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: ", self.artifact)?;
         if let Some(list) = self.list.as_ref().filter(|_| self.passed) {

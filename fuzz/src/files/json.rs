@@ -64,7 +64,7 @@ fn count(value: &Value) -> usize {
     }
 }
 
-/// Returns the value with a number, counted from the root down.
+/// Returns the value at an index in depth-first order; the root has index 0.
 fn at<'a>(value: &'a mut Value, number: &mut usize) -> Option<&'a mut Value> {
     if *number == 0 {
         return Some(value);

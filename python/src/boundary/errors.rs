@@ -12,7 +12,7 @@ use deltille_core::words::with_short_quotes;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyUserWarning};
 use pyo3::prelude::*;
 
-/// The exceptions. They are written in Python because most of them have two bases.
+/// The exceptions. They are written in Python because most of them have two base classes.
 pub mod raised {
     #![allow(missing_docs, reason = "the macro makes types without documentation")]
     pyo3::import_exception!(deltille.errors, Error);

@@ -1,4 +1,4 @@
-//! Runs long work that Ctrl-C interrupts.
+//! Runs long work that Ctrl-C can interrupt.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,8 +17,8 @@ const EVERY: Duration = Duration::from_millis(50);
 /// Time for work to stop after Ctrl-C. After that it is abandoned, and ends on its own.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// Runs work on a separate thread, without the interpreter's lock, and checks for signals meanwhile. The flag asks the work
-/// to stop.
+/// Runs work on a separate thread, without the interpreter's lock, and checks for signals in the
+/// meantime. The flag asks the work to stop.
 ///
 /// # Errors
 /// Returns the exception of a signal handler, such as `KeyboardInterrupt`, or an exception if the work panics.

@@ -110,7 +110,7 @@ impl CalibratedCamera {
         found.map(|covariance| arrays::matrix(py, covariance))
     }
 
-    /// Standard deviations of all parameters, P, float64; NaN for given ones.
+    /// Standard deviations of all parameters, P, float64; NaN for fixed parameters.
     #[getter]
     fn sd<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let parameters = self.estimate().parameters.iter();
@@ -166,8 +166,8 @@ impl CalibratedCamera {
         Pose(self.estimate().camera_from_rig)
     }
 
-    /// Standard deviations of that pose, 6, float64: a rotation (rad) and a translation (mm) about the camera's axes; NaN if
-    /// it was not estimated, as for the first camera.
+    /// Standard deviations of that pose, 6, float64: rotation about (rad) and translation along
+    /// (mm) the camera's axes; NaN if it was not estimated, as for the first camera.
     #[getter]
     fn pose_sd<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         arrays::column(py, self.estimate().pose_sd.unwrap_or([f64::NAN; 6]))

@@ -68,7 +68,7 @@ macro_rules! whole {
                 $solved.estimate.excluded.iter().map(one).collect()
             }
 
-            /// A-posteriori standard deviation per axis; covariances are scaled by its square.
+            /// Standard deviation of unit weight, per axis; covariances are scaled by its square.
             #[getter]
             fn sigma($self: $kind) -> f64 {
                 let file = $solved.in_file(None).and_then(|file| file["sigma"].as_f64());
@@ -307,8 +307,8 @@ impl Rig {
         self.solved.estimate.frames.iter().map(|frame| Pose(frame.rig_from_target)).collect()
     }
 
-    /// Standard deviations of these poses, frames × 6, float64: a rotation (rad) and a translation (mm) about the
-    /// rig's axes.
+    /// Standard deviations of these poses, frames × 6, float64: rotation about (rad) and
+    /// translation along (mm) the rig's axes.
     #[getter]
     fn pose_sd<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         arrays::rows(py, self.solved.estimate.frames.iter().map(|frame| frame.pose_sd))

@@ -33,7 +33,8 @@ impl Compared {
         Self(estimate)
     }
 
-    /// Takes the cameras of a calibration, without uncertainties if it failed, as they are not reliable then.
+    /// Takes the cameras of a calibration. If it failed, their uncertainties are omitted, because
+    /// they are then unreliable.
     fn of_solved(mut cameras: Vec<CameraEstimate>, solved: &Solved) -> Self {
         if solved.said().iter().any(|(_, is_failure)| *is_failure) {
             cameras.iter_mut().for_each(CameraEstimate::forget_uncertainties);
@@ -116,7 +117,8 @@ impl Comparison {
         self.found.largest_px()
     }
 
-    /// Probability (p-value) that noise alone makes them differ as much, if the camera is unchanged.
+    /// Probability (p-value) that noise alone causes a difference of at least this size, if the
+    /// camera is unchanged.
     #[getter]
     fn p_value(&self) -> Option<f64> {
         self.found.p_value
@@ -147,7 +149,7 @@ impl Comparison {
         arrays::rows(py, self.found.compared().map(|place| place.pixel.to_array()))
     }
 
-    /// Differences of the second camera there, N × 2, float64, px.
+    /// Differences of the second camera at these positions, N × 2, float64, px.
     #[getter]
     fn differences<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         arrays::rows(py, self.found.compared().map(|place| place.by.to_array()))
@@ -208,7 +210,8 @@ impl Motion {
         arrays::column(py, self.0.translation_mm.to_array())
     }
 
-    /// Probability (p-value) that noise alone makes as large a motion; ``None`` if uncertainties are not known.
+    /// Probability (p-value) that noise alone causes a motion of at least this size; ``None`` if
+    /// uncertainties are not known.
     #[getter]
     fn p_value(&self) -> Option<f64> {
         self.0.p_value
@@ -364,7 +367,8 @@ impl Located {
         self.view().map(|view| Pose(view.pose))
     }
 
-    /// Standard deviations of the pose, 6, float64: a rotation (rad) and a translation (mm) about the camera's axes.
+    /// Standard deviations of the pose, 6, float64: rotation about (rad) and translation along (mm)
+    /// the camera's axes.
     #[getter]
     fn pose_sd<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         let frame = self.estimate.as_ref()?.frames.first()?;

@@ -4,7 +4,7 @@
 //! order:
 //!
 //! 1. `keywords` contains the functions `calibrate` and `rig`.
-//! 2. `solving` holds their checked arguments, and solves.
+//! 2. `solving` checks their arguments, and solves.
 //! 3. `calibration` is the result, `calibrated_camera` one of its cameras, `views` its views and diagnoses.
 //! 4. `pickled` restores each of these after pickling.
 //! 5. `next_view` proposes the next view.

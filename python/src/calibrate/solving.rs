@@ -261,7 +261,7 @@ pub struct Solved {
 }
 
 impl Solved {
-    /// Makes a result read from a file.
+    /// Creates a result from the content of a file.
     pub fn read(estimate: Estimate, targets: Vec<Printing>, model: String, text: &str) -> Self {
         let whole: Option<Value> = serde_json::from_str(text).ok();
         let file = whole.map(|whole| (text.to_owned(), whole));

@@ -17,7 +17,7 @@ use crate::boundary::errors;
 use crate::pickles;
 use crate::see::pose::Pose;
 
-/// A finding about a calibration, with what to do about it.
+/// A finding about a calibration, with its remedy.
 #[pyclass(frozen, module = "deltille", eq)]
 #[derive(PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {

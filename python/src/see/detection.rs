@@ -37,7 +37,7 @@ impl Reason {
         kind.as_str().unwrap_or_default().to_owned()
     }
 
-    /// The reason and what to do about it, as a sentence.
+    /// The reason and its remedy, as a sentence.
     #[getter]
     fn sentence(&self) -> String {
         errors::one_line(&self.0)

@@ -34,11 +34,10 @@ use crate::targets::target::Target;
 /// allow_mirrored : bool, optional
 ///     Label mirrored grids, too.
 /// max_errors : int, optional
-///     Maximum number of corrected cells per tag; defaults to what the family always corrects.
-/// refine : str, optional
-///     Subpixel method: ``"model"``, with covariances, or ``"polynomial"``, the method of the paper.
-/// max_pixels : int, optional
-///     Maximum number of pixels of an image.
+/// Maximum number of corrected cells per tag; defaults to the number that the family always
+/// corrects. refine : str, optional Subpixel method: ``"model"``, with covariances, or
+/// ``"polynomial"``, the method of the paper. max_pixels : int, optional Maximum number of pixels
+/// of an image.
 ///
 /// Raises
 /// ------
@@ -110,7 +109,7 @@ pub fn sides(rows: Option<i64>, cols: Option<i64>) -> PyResult<[Option<u32>; 2]>
     Ok([side("rows", rows)?, side("cols", cols)?])
 }
 
-/// Checks the rows and columns of a board, of which both or neither must be given.
+/// Checks the rows and columns of a board: both or neither must be given.
 pub fn size(rows: Option<u32>, cols: Option<u32>) -> PyResult<Option<(u32, u32)>> {
     let wrong = |what: &str| Err(raised::DetectionError::new_err(what.to_owned()));
     match (rows, cols) {
@@ -218,7 +217,8 @@ impl Detector {
 
     /// Detects the target in an image.
     ///
-    /// The interpreter's lock is released meanwhile; other threads must not change the array.
+    /// The interpreter's lock is released during detection; other threads must not change the
+    /// array.
     ///
     /// Parameters
     /// ----------
@@ -250,7 +250,7 @@ impl Detector {
         Ok(Detection { found: Arc::new(found), targets: self.targets.clone() })
     }
 
-    /// Detects the target in a photograph, decoded as by ``deltille detect``.
+    /// Detects the target in a photograph, decoded as in ``deltille detect``.
     ///
     /// Parameters
     /// ----------
@@ -287,7 +287,7 @@ impl Detector {
         Ok(Detection { found: Arc::new(found), targets: self.targets.clone() })
     }
 
-    /// Detects the target in the content of a photograph file, decoded as by :meth:`detect_file`.
+    /// Detects the target in the content of a photograph file, decoded as in :meth:`detect_file`.
     ///
     /// Parameters
     /// ----------

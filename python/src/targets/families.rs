@@ -203,8 +203,8 @@ impl Family {
         Ok(rates.map(|rates| arrays::column(py, rates)))
     }
 
-    /// Computes how many cells to correct at most if single tags are trusted, so that false positives in natural images stay
-    /// rare.
+    /// Computes the maximum number of cells to correct in single tags so that false positives in
+    /// natural images stay rare.
     ///
     /// Parameters
     /// ----------

@@ -292,7 +292,8 @@ impl Target {
         Ok(files)
     }
 
-    /// Writes the description, and files to print, cut or render: all or none.
+    /// Writes the description, and files to print, cut or render; if one file fails, none is
+    /// written.
     ///
     /// Parameters
     /// ----------

@@ -149,8 +149,8 @@ fn the_pose_of_an_upside_down_camera_is_right() {
     }
 }
 
-/// A rolled board has different labels in some frames only, also for cameras on their side and, on square boards, for
-/// quarter turns.
+/// A rolled board has different labels in some frames only, also for cameras on their side and, on
+/// square boards, for rotations by 90°.
 #[test]
 fn labels_that_change_between_frames_are_unified() {
     for (rows, cols, rolls) in [

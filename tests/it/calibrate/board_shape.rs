@@ -117,7 +117,8 @@ fn check_same(found: &Estimate, read: &Estimate) {
     }
 }
 
-/// Two cameras determine the shape better than one, and the shape fits held-out frames equally well.
+/// Two cameras determine the shape more precisely than one, and the shape fits held-out frames
+/// equally well.
 #[test]
 fn a_rig_estimates_the_shape_of_a_sheet() {
     let eye = DVec3::new(60.0, 0.0, 0.0);
@@ -142,7 +143,7 @@ fn a_rig_estimates_the_shape_of_a_sheet() {
     assert!(turn.length() < 1e-3 && step.length() < 0.5, "{turn} {step}");
     let text = rig::write(&found, &[], "radtan", Print::default(), Residuals::Listed);
     check_read_back(&found, &text);
-    // Without the shape the board is blamed.
+    // Without the shape, the diagnosis blames the board.
     let flat = both.solve().unwrap();
     let said = both.explain(&flat);
     let is_of_shape = |said: &Diagnosis| matches!(said, Diagnosis::Remedied { remedy, .. } if remedy.alternative == Alternative::Shape);

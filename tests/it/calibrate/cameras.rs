@@ -134,7 +134,7 @@ fn points_outside_the_domain_have_no_projection() {
 /// (1 − 0.1q)(1 − q/q0) / (1 + 0.1q)(1 − q/q1): between q0 and q1 the factor is negative, elsewhere
 /// the two zeros cancel.
 #[test]
-fn a_pole_that_cancels_leaves_a_gap_no_wider_than_itself() {
+fn a_cancelled_pole_invalidates_only_the_narrow_band_between_its_zeros() {
     let product = |a: f64, zero: f64| [a - 1.0 / zero, -a / zero, 0.0];
     let lens = BrownConrady {
         radial: product(-0.1, 1.0),

@@ -110,7 +110,7 @@ fn seen(
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Wrong {
     Nothing,
-    /// This fraction of all corners is anywhere in the image.
+    /// This fraction of all corners is at random positions in the image.
     Anywhere(f64),
     /// This fraction of all corners is displaced in the same way.
     Off(f64, DVec2),
@@ -390,7 +390,7 @@ fn outliers_are_named_and_do_no_harm() {
     check(&table(RADTAN, &icosahedron(), &OF_BOARDS, 0..1), 3.0);
 }
 
-/// One of 20 seeds may be off by more than 3σ; by chance 1 of 370 is.
+/// One of 20 seeds may be off by more than 3σ; 1 of 370 is expected from noise.
 #[test]
 #[ignore = "20 seeds of each fault: minutes"]
 fn outliers_over_twenty_seeds() {

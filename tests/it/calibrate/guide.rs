@@ -103,7 +103,7 @@ fn proposed_photographs_are_taken_until_they_suffice() {
     let falls = sure.windows(2).all(|pair| pair[1] < pair[0]);
     assert!(falls, "every proposed photograph reduces the uncertainty: {sure:?}");
 
-    // The photographs suffice at once, and it ends on its own.
+    // The program ends immediately, because the photographs suffice.
     let until = 1.01 * sure[sure.len() - 1];
     let watch = format!("guide photos --target desk.json --until {until} --picture next.png");
     let output = deltille(at, &watch).success().get_output().clone();

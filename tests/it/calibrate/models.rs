@@ -102,7 +102,7 @@ fn any_camera(model: Model, seed: u64) -> Camera {
     let camera = camera(model);
     let mut values = camera.parameters();
     let from = match model {
-        // Values of these near 0 and 1 make another lens.
+        // Values near 0 and 1 of these parameters describe a different kind of lens.
         Model::Eucm | Model::DoubleSphere => values.len(),
         _ => 4,
     };
@@ -141,14 +141,14 @@ fn chosen(models: &[Model], seeds: std::ops::Range<u64>) -> (usize, usize) {
 }
 
 #[test]
-fn auto_selects_an_adequate_model_the_lens() {
+fn the_selected_model_fits_the_lens() {
     let models = [Model::Radtan, Model::KannalaBrandt(4), Model::Eucm];
     assert_eq!(chosen(&models, 0..2), (6, 6));
 }
 
 #[test]
 #[ignore = "200 lenses with nine models each"]
-fn auto_selects_an_adequate_model_nearly_every_lens() {
+fn the_selected_model_fits_nearly_every_lens() {
     let (good, all) = chosen(&models().collect::<Vec<_>>(), 0..25);
     println!("{good} of {all}");
     assert!(good as f64 >= 0.95 * all as f64, "{good} of {all}");
@@ -186,7 +186,8 @@ fn within_3_sigma(model: Model, seed: u64) -> (usize, usize) {
     (errors.iter().filter(|error| error.abs() <= 3.0).count(), errors.len())
 }
 
-/// A direction with an error of 3σ shifts the poses of all views; several seeds average this out.
+/// An error of 3σ in one direction of the parameters shifts the poses of all views; several seeds
+/// average this out.
 #[test]
 fn every_model_converges_without_a_guess_and_states_its_precision() {
     let counts = models().map(|model| {

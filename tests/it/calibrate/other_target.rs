@@ -137,7 +137,8 @@ fn the_same_board_is_accepted_by_any_name_and_format() {
     deltille(at, "compare measured/camera.json again/camera.json --tolerance 1").success();
 }
 
-/// A refined description also verifies the files of its target: they have the name of its plan.
+/// A refined description also verifies the files of its target, which carry the name of the
+/// original description.
 #[test]
 fn prints_are_verified_by_a_refined_description() {
     let folder = tempfile::tempdir().unwrap();

@@ -156,7 +156,7 @@ fn residuals_over_the_target_are_means_over_all_views() {
             .collect();
         let [row, col, rms, x, y, views] = numbers[..] else { panic!("{title}") };
         let all = &seen[&(row as i32, col as i32)];
-        // A corner that is an outlier in most views is not one by accident.
+        // A corner that is an outlier in most views has a systematic error.
         let inliers = all.iter().filter(|corner| !corner.outlier).count();
         let counts = |corner: &&&Corner| 2 * inliers < all.len() || !corner.outlier;
         let corners: Vec<&&Corner> = all.iter().filter(counts).collect();

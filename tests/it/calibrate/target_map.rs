@@ -93,7 +93,8 @@ fn of(views: Vec<View>) -> Calibration {
     Calibration::new([Pose::IDENTITY]).camera("", views, Model::Radtan)
 }
 
-/// The truth without what poses and distances absorb, for each panel separately or for all together.
+/// The truth without the part that poses and distances absorb, for each panel separately or for all
+/// together.
 fn without_gauge(truth: &[DVec3], map: &TargetMap, panels: &[Pose], by_panel: bool) -> Vec<DVec3> {
     let corners = map.corners();
     let [plane, out] = map.expected_mm;
@@ -250,7 +251,7 @@ fn a_rig_measures_several_panels() {
 
 /// A map measured with some views reduces the residuals of others to noise, and both files restore it.
 #[test]
-fn a_measured_target_serves_other_views() {
+fn a_measured_target_reduces_the_residuals_of_other_views() {
     let offsets = Sheet { random_mm: 0.08, bent_mm: 0.1 }.offsets(1, 7);
     let some = |seed: u64| views(&[Pose::IDENTITY], &offsets, &Pose::IDENTITY, 20, seed);
     let found = of(some(1)).measure_target(true).hold_out(Some(4)).solve().unwrap();

@@ -49,7 +49,7 @@ fn photograph(kind: GridKind, cover: impl Fn(f64, f64) -> Option<f32>) -> Gray<f
     })
 }
 
-/// Returns the image with pixels `scale` times as small, bilinear, as 8 bits.
+/// Returns the image enlarged by `scale` with bilinear interpolation, as 8 bits.
 fn enlarged(image: &Gray<f32>, scale: usize) -> Gray<u8> {
     let to = |v: usize| (v as f64 + 0.5) / scale as f64 - 0.5;
     Gray::from_fn(scale * image.width(), scale * image.height(), |x, y| {

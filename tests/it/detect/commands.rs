@@ -95,8 +95,8 @@ fn a_plain_checkerboard_is_found_and_numbered_by_rows() {
     assert!(orpc.lines().nth(16).unwrap().starts_with("-1,11,0,"), "{orpc}");
 }
 
-/// Flopped sheets of a tagged and of an untagged target, and of an untagged board of known size. They are reported, and
-/// on request labelled as on the print.
+/// Mirrored sheets of a tagged and of an untagged target, and of an untagged board of known size.
+/// They are reported, and on request labelled as on the print.
 #[test]
 fn mirrored_boards_are_reported_and_labelled_on_request() {
     let folder = board();

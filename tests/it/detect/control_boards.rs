@@ -50,7 +50,8 @@ fn board(family: &Family, first_id: u32, spacing: u32, cols: u32) -> Board {
 /// A family with the same number of bits, and random codes.
 fn random_family(like: &Family, rng: &mut ChaCha8Rng) -> Family {
     let mask = like.dimension().mask();
-    // With few bits, some codes are equal now and then, perhaps after a rotation. Such codes are not a family.
+    // With few bits, some random codes are occasionally equal, possibly after a rotation. These
+    // codes are not a valid family.
     loop {
         let codes = (0..60).map(|_| rng.random::<u64>() & mask).collect();
         let (rules, construction) = (like.rules().clone(), like.construction().clone());

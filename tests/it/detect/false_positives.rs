@@ -1,4 +1,4 @@
-//! Images without a target: no grid and no tag is reported.
+//! Images without a target: no grids and no tags are reported.
 
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
@@ -148,7 +148,8 @@ fn halftones_of_dots_that_do_not_meet() {
     }
 }
 
-/// Where a screen reaches 50 %, its dots meet like squares of a checkerboard, for any target.
+/// Where a screen reaches 50 %, its dots meet like squares of a checkerboard; this is tested with
+/// every target.
 #[test]
 fn halftones_and_dithers_of_gradients() {
     for (period_px, angle) in [(10.0, 45.0), (14.0, 20.0), (20.0, 70.0)] {
@@ -184,9 +185,10 @@ fn no_checkerboard_in(images: impl IntoIterator<Item = (String, Gray<u8>)>) {
     assert!(lines.is_empty(), "{}", lines.join("\n"));
 }
 
-/// A sum of two waves at a slant is a slanted, blurred checkerboard. It has no waves of a third of the length.
+/// The sum of two oblique waves resembles an oblique, blurred checkerboard, but it lacks the third
+/// harmonic.
 #[test]
-fn two_waves_at_a_slant() {
+fn two_oblique_waves() {
     let waves = [(0.0, 8.0, 40.0, 14.0), (20.0, 9.0, 75.0, 31.0), (80.0, 24.0, 110.0, 17.0)];
     no_checkerboard_in(waves.map(|(a, pitch_a, b, pitch_b)| {
         let image = photograph(|x, y| {
@@ -229,7 +231,7 @@ fn fields_of_random_cells() {
 
 /// Where dots of one screen lie between those of another, they look like squares.
 #[test]
-fn screens_slightly_turned() {
+fn slightly_rotated_screens() {
     for (pitch, turn, ratio) in
         [(12.0, 6.0, 0.93), (16.0, 9.0, 1.05), (22.0, 3.0, 1.08), (26.0, 14.0, 0.95)]
     {

@@ -149,8 +149,8 @@ fn corners_of_the_fisheye_photographs() {
     assert!(found * 1000 >= all * 999, "{found} of {all} corners");
 }
 
-/// Enlarged to 48 megapixels, a photograph shows its corners where it did before. They lie among grain, which is as
-/// large and far more frequent, and ink spread covers several pixels.
+/// A photograph enlarged to 48 megapixels has its corners at the same positions. Grain of the same
+/// size is far more frequent than corners, and ink spread covers several pixels.
 #[test]
 fn enlarged_photographs_show_the_same_corners() {
     for (folder, kind, size) in

@@ -144,7 +144,8 @@ fn meet(triangle: [DVec3; 3], eye: DVec3, ray: DVec3) -> Option<f64> {
     (normal.dot(ray) < 0.0 && t > 0.0 && inside).then_some(t)
 }
 
-/// Parts of a concave solid that it hides itself are neither drawn nor in the truth; ray casting confirms it.
+/// The parts of a concave solid that are hidden by other parts of it are absent from the image and
+/// from the truth, as ray casting confirms.
 #[test]
 fn hidden_parts_of_a_concave_solid_are_hidden() {
     let shape = SolidShape::Mesh(spikes());
@@ -265,7 +266,7 @@ fn how_seen(panel: &Panel, camera: &Camera, pose: &Pose, bits: f64) -> Option<(f
             camera.project(pose.apply(point))
         };
         let here = at(0.0, 0.0)?;
-        // Room for all tiles around.
+        // Margin for all adjacent tiles.
         if !camera.sees(here, 40.0) {
             return None;
         }

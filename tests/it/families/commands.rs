@@ -78,9 +78,9 @@ fn the_published_lexicode_is_written_as_shipped() {
     );
 }
 
-/// Each command that reads families says what is wrong with a file.
+/// Each command that reads families names the problem of an invalid file.
 #[test]
-fn commands_say_what_is_wrong_with_a_family() {
+fn commands_name_the_problem_of_an_invalid_family() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let shipped = Path::new(crate::common::REPOSITORY).join("families/delTag16h5.json");
@@ -249,7 +249,7 @@ fn a_larger_family_is_not_replaced() {
 /// The coverage of a family: the tags of one board and of one icosahedron, as `deltille` generates them; and the
 /// smallest family that suffices.
 #[test]
-fn families_are_described_by_what_they_cover() {
+fn families_are_described_by_the_targets_that_they_cover() {
     let folder = tempfile::tempdir().unwrap();
     let mut page = Page::default();
     for args in [
@@ -398,7 +398,7 @@ fn tables_of_other_programs_become_families() {
     std::fs::write(at.join("mine.py"), format!("BITS = 16\ncodes = [\n{}]\n", list(""))).unwrap();
     std::fs::write(at.join("words.txt"), "231b\n2ea5\n346a\n").unwrap();
     std::fs::write(at.join("prose.txt"), "no table\n").unwrap();
-    // White and black alone look the same in all rotations.
+    // Only the all-white and the all-black tag are unchanged by every rotation.
     std::fs::write(at.join("blank.txt"), "231b\n0000\n").unwrap();
     let mut page = Page::default();
     for args in [

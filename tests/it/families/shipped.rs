@@ -17,7 +17,7 @@ fn shipped() -> Vec<Family> {
 }
 
 #[test]
-fn every_claim_of_every_shipped_family_holds() {
+fn every_claim_of_every_shipped_family_is_true() {
     for family in shipped() {
         let certificate = certify(&family);
         assert_eq!(certificate.failures, [""; 0], "{}", family.name());
@@ -107,7 +107,7 @@ fn lexicodes_of_36_bits_are_the_published_ones() {
 
 /// Above 100,000 codes the distance is proved by the structure of the code, and a wrong code is still found.
 #[test]
-fn very_large_families_are_proved_by_their_structure() {
+fn distances_of_very_large_families_are_proved_by_their_structure() {
     let shipped = Family::shipped("d49h12").unwrap();
     let Construction::Algebraic(mut construction) = shipped.construction().clone() else {
         panic!("d49h12 is algebraic")
@@ -138,7 +138,7 @@ fn very_large_families_are_proved_by_their_structure() {
 /// Also for a code with more words than can be listed: the weights of the dual code are computed, and the codes are
 /// those given by its parameters.
 #[test]
-fn families_of_64_bits_are_proved_by_the_dual_code() {
+fn distances_of_families_of_64_bits_are_proved_by_the_dual_code() {
     let shipped = Family::shipped("d64h12").unwrap();
     let Construction::Algebraic(construction) = shipped.construction().clone() else {
         panic!("d64h12 is algebraic")
@@ -184,9 +184,9 @@ fn families_of_64_bits_are_proved_by_the_dual_code() {
     }
 }
 
-/// Searches of 64 bits, from a shipped family and from nothing, with free and with hidden cells.
+/// Searches of 64 bits, from a shipped family and from scratch, with free and with hidden cells.
 #[test]
-fn best_families_of_64_bits_hold() {
+fn claims_of_searched_families_of_64_bits_are_true() {
     let dimension = Dimension::from_bits(64).unwrap();
     for (distance, free, robust) in [
         (12, None, None),
@@ -214,7 +214,7 @@ fn best_families_of_64_bits_hold() {
 }
 
 #[test]
-fn best_families_hold_under_all_rules() {
+fn claims_of_searched_families_are_true_under_all_rules() {
     for (bits, distance, rules) in [
         (9, 3, Rules { black_distance: 3, ..Rules::NONE }),
         (16, 6, Rules { min_complexity: 0.6, black_distance: 6, white_distance: 6, ..Rules::NONE }),

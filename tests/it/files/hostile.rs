@@ -425,22 +425,22 @@ fn assert_defused(what: &str, bombs: impl IntoIterator<Item = Bomb>) {
 }
 
 #[test]
-fn meshes_are_defused() {
+fn hostile_meshes_are_rejected_or_harmless() {
     assert_defused("meshes", meshes());
 }
 
 #[test]
-fn pages_are_defused() {
+fn hostile_pages_are_rejected_or_harmless() {
     assert_defused("pages", pages());
 }
 
 #[test]
-fn pictures_are_defused() {
+fn hostile_images_are_rejected_or_harmless() {
     assert_defused("pictures", pictures());
 }
 
 #[test]
-fn cameras_and_other_texts_are_defused() {
+fn hostile_cameras_and_other_texts_are_rejected_or_harmless() {
     assert_defused("texts", cameras().into_iter().chain(others()));
 }
 

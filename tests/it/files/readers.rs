@@ -1,5 +1,6 @@
-//! Every reader gets valid files, files that were harmful before, and files with a few changes that keep their form. None may
-//! panic, end without a result, or accept an invalid file. The fuzz targets in `fuzz/` do the same for hours.
+//! Every reader gets valid files, files that once caused a fault, and mutated files that keep their
+//! format. No reader may panic, end without a result, or accept an invalid file. The fuzz targets
+//! in `fuzz/` do the same for hours.
 
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -7,7 +8,7 @@ use std::path::Path;
 
 use crate::changed::{Dice, READERS, Reader};
 
-/// Number of changed files for each reader.
+/// Number of mutated files for each reader.
 const CHANGED: u64 = 150;
 
 /// Reads a file and returns the name of the reader if it panicked.
@@ -17,14 +18,14 @@ fn harm(reader: &Reader, what: &str, bytes: &[u8]) -> Option<String> {
 }
 
 #[test]
-fn good_files_are_read() {
+fn valid_files_are_read() {
     let refused = READERS.iter().filter(|reader| !reader.read(&reader.good()));
     let refused: Vec<&str> = refused.map(|reader| reader.name).collect();
     assert!(refused.is_empty(), "{refused:?}");
 }
 
 #[test]
-fn files_of_the_corpus_do_no_harm() {
+fn corpus_files_violate_no_guarantee_of_a_reader() {
     let corpus = Path::new(crate::common::REPOSITORY).join("fuzz/corpus");
     let mut harms = Vec::new();
     for folder in fs::read_dir(corpus).unwrap().map(|entry| entry.unwrap().path()) {
@@ -37,7 +38,7 @@ fn files_of_the_corpus_do_no_harm() {
 }
 
 #[test]
-fn changed_files_do_no_harm() {
+fn mutated_files_violate_no_guarantee_of_a_reader() {
     let mut harms = Vec::new();
     for reader in READERS {
         let mut bytes = reader.good();

@@ -103,7 +103,7 @@ fn each_file_is_accepted_by_one_reader() {
 /// Files of `tests/corpus`, whose names state their kind and fault: no reader needs more memory or time than for a valid file,
 /// and none panics.
 #[test]
-fn recorded_faults_are_refused_or_read() {
+fn faulty_files_of_the_corpus_are_refused_or_read() {
     let mut files = 0;
     for entry in
         std::fs::read_dir(Path::new(crate::common::REPOSITORY).join("tests/corpus")).unwrap()

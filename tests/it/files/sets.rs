@@ -306,13 +306,13 @@ fn kill(trials: u64) {
 }
 
 #[test]
-fn killed_runs_leave_no_mixture() {
+fn killed_runs_leave_the_old_or_the_new_set() {
     kill(24);
 }
 
 #[test]
 #[ignore = "many minutes"]
-fn a_thousand_killed_runs_leave_no_mixture() {
+fn a_thousand_killed_runs_leave_the_old_or_the_new_set() {
     kill(1000);
 }
 

@@ -66,7 +66,7 @@ fn every_file_asked_for_is_written_under_its_name() {
 }
 
 #[test]
-fn a_paper_alone_is_filled() {
+fn without_an_edge_length_the_board_fills_the_paper() {
     let folder = tempfile::tempdir().unwrap();
     let args = "board --rows 10 --cols 11 --paper a3";
     deltille(folder.path()).args(args.split(' ')).assert().success();
@@ -92,7 +92,7 @@ fn a_saved_template_reproduces_the_board_and_options_override_it() {
 }
 
 #[test]
-fn dense_boards_have_a_place_code_in_every_tile_also_by_template_and_on_solids() {
+fn dense_boards_and_solids_have_a_position_code_in_every_upright_tile() {
     let folder = tempfile::tempdir().unwrap();
     let args =
         "board --dense --rows 6 --cols 7 --board-id 254 --save-template t.toml --name d --png";
@@ -110,7 +110,7 @@ fn dense_boards_have_a_place_code_in_every_tile_also_by_template_and_on_solids()
         panic!("a board")
     };
     assert_eq!(spec.tags.map(|tags| (tags.family, tags.spacing)), Some(("d25h7".to_owned(), 3)));
-    // Boards with other ids show other words.
+    // Boards with different ids contain different position codes.
     let ids = |target: &Printing| -> Vec<u32> {
         target.target.panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id).collect()
     };
@@ -144,7 +144,7 @@ fn each_board_packed_on_a_sheet_is_verified() {
 /// The note is on every label, both of the sheet and of each board that is cut out, on a separate line below the
 /// board.
 #[test]
-fn a_note_goes_with_every_board_that_is_cut_out() {
+fn every_board_that_is_cut_out_carries_the_note() {
     let folder = tempfile::tempdir().unwrap();
     let made = "board --rows 3 --cols 4 --edge 12mm --boards 6 --pack --note Lab-3 --svg";
     deltille(folder.path()).args(made.split(' ')).assert().success();
@@ -280,7 +280,7 @@ proptest! {
 
     /// Any numbers give either a board or a one-line error, and never part of a board.
     #[test]
-    fn numbers_of_any_size_make_a_board_or_one_line(
+    fn numbers_of_any_size_give_a_board_or_a_one_line_error(
         rows in prop_oneof!["[0-9]{1,2}", "-?[0-9]{1,12}", "NaN|inf|1e9|"],
         edge in prop_oneof!["[0-9]{1,2}mm", "-?[0-9]{1,9}(\\.[0-9])?(mm|cm|m|in|pt)", "NaN|inf|"],
         border in prop_oneof!["[1-3]", "-?[0-9]{1,9}", "NaN|inf|"],

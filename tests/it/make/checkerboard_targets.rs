@@ -59,7 +59,7 @@ fn turns_of(words: &TagWords, code: u64) -> [u64; 4] {
 }
 
 #[test]
-fn short_names_are_understood() {
+fn short_family_names_are_accepted() {
     assert_eq!(Family::shipped("t36h11").unwrap().name(), "aprilTag36h11");
     assert_eq!(Family::shipped("aprilTag36h11").unwrap().code(0), Some(0xd_5d62_8584));
 }

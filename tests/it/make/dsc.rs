@@ -82,7 +82,7 @@ proptest! {
     }
 
     #[test]
-    fn sloppy_writing_is_understood(crlf: bool, spaces: bool, newline: bool, unit in 0usize..3) {
+    fn irregular_formatting_is_accepted(crlf: bool, spaces: bool, newline: bool, unit in 0usize..3) {
         let target = board(3, 4, 20.0, 2);
         let mut text = dsc::write(&target, Dialect::Fork).unwrap();
         // (coordinates, size) in mm and cm, or in m and cm.
@@ -109,12 +109,12 @@ proptest! {
     }
 
     #[test]
-    fn no_text_panics(text in "([0-9tdelTagh.,\\- ]{0,20}\n){0,8}") {
+    fn no_text_makes_the_reader_panic(text in "([0-9tdelTagh.,\\- ]{0,20}\n){0,8}") {
         let _ = dsc::read(&text, "text");
     }
 
     #[test]
-    fn no_cut_panics(cut in 0usize..2000) {
+    fn no_truncated_file_makes_the_reader_panic(cut in 0usize..2000) {
         let text = dsc::write(&board(4, 4, 20.0, 1), Dialect::Fork).unwrap();
         let _ = dsc::read(&text[..cut.min(text.len())], "text");
     }

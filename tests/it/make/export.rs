@@ -1,4 +1,4 @@
-//! Output of the writers: reviewed as text, and rendered by programs other than the writers.
+//! Output of the writers: reviewed as text, and rendered by independent programs.
 
 use std::path::Path;
 use std::process::Command;

@@ -64,7 +64,8 @@ fn faces_are_shared_among_textures() {
     page.run(at, "deltille verify four.json four.usda");
     page.is("several-textures");
 
-    // Textures that no mesh shows any more are named. A missing texture is reported once, whichever meshes show it.
+    // Textures that no mesh shows any more are named. A missing texture is reported once, even if
+    // several meshes use it.
     let again = "tetrahedron --edge 100mm --tiles 6 --name each --obj --textures 3 --no-verify";
     let said = deltille(at, again).success();
     let said = String::from_utf8(said.get_output().stderr.clone()).unwrap();

@@ -44,7 +44,7 @@ fn nets_with_ids_and_a_guide_are_still_folded() {
 /// The corners of the back lie behind those of the front, in the same order seen from the front, on pages that match
 /// when printed on both sides of a sheet.
 #[test]
-fn two_sides_of_a_board_lie_behind_each_other() {
+fn the_two_sides_of_a_board_are_back_to_back() {
     let folder = tempfile::tempdir().unwrap();
     let args =
         "board --rows 6 --cols 7 --edge 25mm --two-sided 4mm --pdf --gltf --save-template t.toml";

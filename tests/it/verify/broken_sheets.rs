@@ -323,7 +323,7 @@ fn dirt_and_holes_in_tiles_are_found() {
 }
 
 #[test]
-fn words_erased_or_altered_and_spots_outside_the_board_are_found() {
+fn erased_or_altered_texts_and_spots_outside_the_board_are_found() {
     let board = board(spec());
     let mut altered = board.target.clone();
     let label = &mut altered.sheets[0].texts[0].text;

@@ -1,6 +1,6 @@
 //! Mutations of the grammar of text formats: none may pass.
 //!
-//! `tests/independent/mutants.py` checks with other programs what does pass.
+//! `tests/independent/mutants.py` checks the mutants that do pass with other programs.
 
 use deltille::export::artifacts::{Making, What, make};
 use deltille::export::dsc::Dialect;

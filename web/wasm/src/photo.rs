@@ -13,7 +13,7 @@ use crate::errors::Raise;
 /// Maximum number of pixels of an image: the browser keeps several copies in memory.
 const MAX_PIXELS: u64 = 64_000_000;
 
-/// A photograph, decoded as by the programs.
+/// A photograph, decoded as in the programs.
 #[wasm_bindgen]
 pub struct Photograph {
     photograph: photograph::Photograph,

@@ -1,4 +1,4 @@
-//! All files of a target, in memory, and sets of files that are written all or none.
+//! All files of a target, in memory, and sets of files that are written completely or not at all.
 //!
 //! ```
 //! use deltille_layout::Printing;
@@ -37,7 +37,7 @@ use deltille_layout::artwork::{ArtworkError, CuttingError};
 /// Default resolution of PNG pages, dots per inch.
 pub const DEFAULT_DPI: f64 = 300.0;
 
-/// The kinds of files that can be made of a target.
+/// The kinds of files that can be made from a target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum What {
@@ -59,7 +59,8 @@ pub enum What {
     Sdf,
     /// `<name>.urdf`, likewise for ROS.
     Urdf,
-    /// `<name>.xml`, likewise for MuJoCo; several textures also have an OBJ each.
+    /// `<name>.xml`, likewise for MuJoCo; with several textures, one more OBJ file for each
+    /// texture.
     Mjcf,
     /// `<name>.usda`, with its textures.
     Usd,
@@ -139,7 +140,7 @@ impl FromStr for What {
     }
 }
 
-/// Settings of making files.
+/// Settings for making files.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Making {
@@ -182,7 +183,7 @@ pub enum MakeError {
     /// It has no skeleton.
     #[error("{0} has no skeleton: set {SolidSkeleton}")]
     NoSkeleton(String),
-    /// Its specification does not give one.
+    /// Its specification is not a valid target.
     #[error(transparent)]
     Target(#[from] TargetError),
     /// Kalibr does not support it.
@@ -196,7 +197,7 @@ pub enum MakeError {
 /// Names and contents of files in memory.
 pub type Files = Vec<(String, Vec<u8>)>;
 
-/// Makes the files of one kind of a target.
+/// Makes the files of one kind for a target.
 ///
 /// # Errors
 /// Returns an error if the target has no files of this kind, or if the family of its tags is unknown.
@@ -246,8 +247,8 @@ pub fn make(printing: &Printing, what: What, making: Making) -> Result<Files, Ma
     })
 }
 
-/// Returns the files of a mesh in one format: [`What::Gltf`], [`What::Obj`], or a model for a simulator. Kinds that are not made
-/// of a mesh have no files.
+/// Returns the files of a mesh in one format: [`What::Gltf`], [`What::Obj`], or a model for a
+/// simulator. Kinds that are not made from a mesh yield no files.
 pub fn of_mesh(mesh: &TexturedMesh, what: What) -> Files {
     let (name, count) = (&mesh.name, mesh.textures.len());
     let named = |end: &str, text: String| (format!("{name}{end}"), text.into_bytes());
@@ -359,8 +360,10 @@ pub enum SetError {
     },
 }
 
-/// Writes files into a folder, all or none (see [`crate::export::writing::staging`]), and returns their paths. An existing file of
-/// the same kind is replaced. A file of another kind, and the description of another board, are replaced only with `overwrite`.
+/// Writes a set of files into a folder, completely or not at all (see
+/// [`crate::export::writing::staging`]), and returns their paths. An existing file of the same kind
+/// is replaced. A file of another kind, and the description of another board, are replaced only
+/// with `overwrite`.
 ///
 /// # Errors
 /// Returns an error if an existing file would be lost, or if the files cannot be written.

@@ -1,6 +1,6 @@
 //! Formats selected by name. Each kind of format is a table from which options, help texts and errors are generated.
 
-/// A format, as a line of a table.
+/// A format, as a row of a table.
 pub trait Format: Sync + 'static {
     /// The name that selects the format.
     fn name(&self) -> &'static str;

@@ -1,4 +1,5 @@
-//! Guards for third-party code: panics become errors, and endless work is abandoned after a time limit.
+//! Guards for third-party code: panics become errors, and code that does not end is abandoned after
+//! a time limit.
 
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};
@@ -71,7 +72,7 @@ pub fn bounded<T: Send + 'static>(
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Guard {
     /// On the calling thread without a time limit, like [`caught`]: for platforms without threads, for example a
-    /// browser. Endless work is not detected, and the stack is not enlarged.
+    /// browser. Endless loops are not detected, and the stack is not enlarged.
     #[default]
     Here,
     /// On a separate thread with a time limit, like [`bounded`].
@@ -94,7 +95,7 @@ impl Guard {
         }
     }
 
-    /// The instant at which `time` from now has passed; `None` without a time limit.
+    /// The instant that lies `time` from now; `None` without a time limit.
     pub fn end(self, time: Duration) -> Option<Instant> {
         match self {
             Self::Here => None,
@@ -108,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn panics_and_endless_work_are_errors() {
+    fn panics_and_endless_loops_become_errors() {
         assert_eq!(caught(|| 1), Ok(1));
         assert_eq!(caught(|| -> u8 { panic!("not to be seen") }), Err(Broken::Panic));
         let second = Duration::from_secs(10);

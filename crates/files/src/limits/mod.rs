@@ -147,7 +147,7 @@ pub enum ReadError {
     Io {
         /// The file.
         path: PathBuf,
-        /// The error of the system.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// The path is a folder, or a device or pipe, which may never end.
@@ -155,7 +155,7 @@ pub enum ReadError {
     NotFile {
         /// The path.
         path: PathBuf,
-        /// The kind of thing found there.
+        /// The kind of the object found there.
         what: &'static str,
     },
     /// The file has more bytes than the limits allow.

@@ -431,7 +431,7 @@ mod tests {
     }
 
     #[test]
-    fn every_diagnosis_is_a_warning_once() {
+    fn every_diagnosis_gives_exactly_one_warning() {
         let estimate = estimate(2, 1);
         let other = estimate.cameras[0].camera.clone();
         let diagnoses = [

@@ -10,7 +10,7 @@
 //! 5. `sections` puts tables and plots under headlines, with the elements of `html`.
 //! 6. `page` assembles the verdict, the advice and the sections of each camera.
 //!
-//! A module imports from those above it in this list, or from `html`, never in a circle.
+//! A module imports only from those above it in this list, or from `html`; no imports are circular.
 //!
 //! Limits: the tilt of a view is shown for planar targets only, because the faces of a solid have different tilts.
 

@@ -121,7 +121,8 @@ fn in_space(report: &Report) -> String {
     section("3D view", &figures(drawn))
 }
 
-/// The verdict at the top of the page. The most serious piece of advice determines its text, colour and sign.
+/// The verdict at the top of the page. The most serious piece of advice determines its text, colour
+/// and symbol.
 fn verdict(report: &Report, advice: &[Advice]) -> String {
     let is_failure = report.diagnoses.iter().any(Diagnosis::is_failure);
     let worst = advice.iter().map(|piece| piece.weight).max().unwrap_or(Weight::Good);
@@ -147,7 +148,7 @@ fn verdict(report: &Report, advice: &[Advice]) -> String {
     )
 }
 
-/// CSS class and sign of advice by its weight.
+/// CSS class and symbol of a piece of advice by its weight.
 fn class_and_sign(weight: Weight) -> (&'static str, &'static str) {
     match weight {
         Weight::Good => ("good", "✓"),

@@ -264,8 +264,9 @@ mod tests {
         Subject::of_kind(kind, family.as_ref()).unwrap()
     }
 
-    /// Without noise and tone curve, a corner lies where the paths of the page say, up to the residual of the corner
-    /// model. So neither the renderer nor the ground truth is shifted.
+    /// Without noise and tone curve, the detected corner lies at the position given by the paths of
+    /// the page, up to the residual of the corner model. So neither the renderer nor the ground
+    /// truth is shifted.
     #[test]
     fn corners_of_a_clean_image_match_the_ground_truth() {
         let scene = scene::Scene {

@@ -26,7 +26,7 @@ const CLEAR_PX: f64 = 3.0;
 /// Fraction of its contrast below which glare makes a corner invisible.
 const MIN_CONTRAST: f64 = 0.5;
 
-/// Focal length in image widths: 53° wide.
+/// Focal length in image widths: a field of view of 53°.
 const FOCAL_WIDTHS: f64 = 1.0;
 
 /// Range of the distortion coefficient.

@@ -2,9 +2,9 @@
 //! one; their common surface is compared like a printed page, face by face. A skeleton is a single body, see
 //! [`super::shape`].
 //!
-//! Vertices lie on a face, below it on the floor of the inlay, or on the back of a plate; triangles are level or
-//! upright. The outline visible on the surface is therefore the outline of the bodies at every depth, and volumes
-//! follow from areas.
+//! Vertices lie on a face, below it on the floor of the inlay, or on the back of a plate; triangles
+//! are parallel or perpendicular to the face. The outline visible on the surface is therefore the
+//! outline of the bodies at every depth, and volumes follow from areas.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -53,7 +53,8 @@ struct Face<'a> {
     outline: Vec<DVec2>,
 }
 
-/// Reads the 3MF of a board, a solid or a skeleton, as its name says, and compares it with the target.
+/// Reads a 3MF and compares it with the target. The file name determines whether it is a board, a
+/// solid or a skeleton.
 ///
 /// # Errors
 ///
@@ -185,7 +186,8 @@ impl Face<'_> {
         fronts.collect()
     }
 
-    /// Whether a triangle lies on this face or below it at one of these depths, is level or upright, and has an area.
+    /// Whether a triangle lies on this face or below it at one of these depths, is parallel or
+    /// perpendicular to it, and has a nonzero area.
     fn has(&self, triangle: &Triangle, depths_mm: &[f64]) -> bool {
         let flat = triangle.map(|v| self.panel.pose.panel_from_target(v));
         let is_near = |v: DVec3| {
@@ -240,7 +242,7 @@ fn wrong_shape(
     })
 }
 
-/// Checks that the bodies together fill the faces and the whole.
+/// Checks that the bodies together fill the faces and the whole volume.
 fn not_filled(
     verifier: &Verifier,
     faces: &[Face],
@@ -272,7 +274,8 @@ fn area(triangles: &[[DVec2; 3]]) -> f64 {
     triangles.iter().map(|corners| polygon::area(corners)).sum()
 }
 
-/// Returns a face as a page, its expected appearance, and where both bodies or neither of them lie.
+/// Returns a face as a page, its expected appearance, and the pixels that both bodies or neither of
+/// them cover.
 fn surface(
     verifier: &Verifier,
     face: &Face,

@@ -40,7 +40,7 @@ use deltille_files::export::{stl, threemf};
 /// precision, and some triangles are small.
 const NORMAL_SLACK: f64 = 1e-3;
 
-/// Tolerance of the ratio of the volumes from 1: vertices are in single precision.
+/// Maximum deviation of the ratio of the volumes from 1: vertices are in single precision.
 const VOLUME_SLACK: f64 = 1e-4;
 
 /// Rays start this far above a face, mm, and keep this distance from the lines where ribs, seats and windows meet,
@@ -72,7 +72,8 @@ pub(crate) fn verify(
     Ok(compare(verifier, path, &load_stl(reader, path)?, Format::Stl)?.with(refused))
 }
 
-/// Compares the triangles of a solid or of its skeleton, as the file name says, with the target.
+/// Compares the triangles of a solid or of its skeleton with the target. The file name determines
+/// which of the two it is.
 ///
 /// # Errors
 ///

@@ -1,9 +1,10 @@
 //! Verification of drawings of boards and faces for a laser or a plotter, as `.dxf` or `.svg`.
 //!
 //! The kerf is measured: it follows from the difference between the length of the first plate's outline and the edge
-//! of that plate. Every outline must then be where the target has it with that kerf. Independently of that, the half
-//! kerf that the beam removes is given back to the engraved areas, and the detector examines the resulting board like
-//! a printed page. resvg also renders an SVG, which must show nothing but the parsed outlines.
+//! of that plate. With that kerf, every outline must then be at its position in the target.
+//! Independently of that, the half kerf that the beam removes is added back to the engraved areas,
+//! and the detector examines the resulting board like a printed page. resvg also renders an SVG,
+//! which must show nothing but the parsed outlines.
 
 use std::path::Path;
 
@@ -43,7 +44,7 @@ pub(crate) fn is_named(target: &Target, path: &Path) -> bool {
     let name = file_name(path);
     let ending = |extension: &str| laser_file_name("", extension);
     let ends = ["dxf", "svg"].iter().any(|extension| name.ends_with(&ending(extension)));
-    // Exclude a page of a target whose own name ends like that.
+    // Exclude a page of a target whose own name has this ending.
     ends && !name.starts_with(&format!("{}.", target.name))
 }
 
@@ -130,7 +131,8 @@ fn kerf_of(found: &CutDrawing, boards: &[LaserBoard]) -> Option<f64> {
     let board = boards.first()?;
     let holes = if board.panel.hole_mm.is_some() { board.panel.tags.len() } else { 0 };
     let cut = found.paths.iter().filter(|path| path.layer == CutLayer::Cut).nth(holes)?;
-    // All edges move by the same distance, so corners stay and lengths grow evenly.
+    // All edges move by the same distance, so the number of corners is unchanged and the length
+    // grows linearly.
     let finished = length(&board.plate_mm);
     let by_a_millimetre = length(&artwork::moved_inwards(&board.plate_mm, -0.5)) - finished;
     Some((length(&cut.points_mm) - finished) / by_a_millimetre)

@@ -22,7 +22,7 @@ const CUT_TOLERANCE_MM: f64 = 0.001;
 /// Distance within which a path is treated as a displaced stated path, mm.
 const MOVED_MM: f64 = 20.0;
 
-/// Reads a `.dxf` and compares it with the target's panels or its net, as the file name says.
+/// Reads a `.dxf` and compares it with the target's panels or its net, depending on the file name.
 pub(crate) fn verify(
     verifier: &Verifier,
     reader: &Reader,

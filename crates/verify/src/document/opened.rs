@@ -113,7 +113,7 @@ impl Document {
         let image = match &*self.content {
             Content::Png(png) => png.image().clone(),
             _ => {
-                // Render a page of zero width one pixel wide, and as long as it is.
+                // A page of zero width is rendered one pixel wide, at its full height.
                 let [width, height] = [width_mm, height_mm].map(|mm| pixels(mm, px_per_mm));
                 if width.saturating_mul(height) as f64 > 2.0 * MAX_PIXELS {
                     let problem =

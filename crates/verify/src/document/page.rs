@@ -4,7 +4,8 @@ use glam::DVec2;
 
 use deltille_core::raster::Gray;
 
-/// Tolerance of the ink of an area from 0 or 1 on a rendered page: the effect of rounding to 255 grey values.
+/// Maximum deviation of the ink of an area from 0 or 1 on a rendered page: the effect of rounding
+/// to 255 grey values.
 pub(crate) const MAX_INK_ERROR: f64 = 0.01;
 
 /// Tolerance of ink near an edge, where the edge is smeared.
@@ -31,7 +32,7 @@ pub struct Page {
 }
 
 impl Page {
-    /// Returns the tolerance of ink from 0 or 1 beside an edge.
+    /// Returns the maximum deviation of ink from 0 or 1 beside an edge.
     pub fn max_ink_error_at_edges(&self) -> f64 {
         if self.smear_px > 0.0 { SMEARED_INK_ERROR } else { MAX_INK_ERROR }
     }
@@ -50,8 +51,9 @@ impl Page {
         DVec2::new(from_top.x, self.height_mm - from_top.y)
     }
 
-    /// Returns the page blurred as by a lens: each pixel averaged with its neighbours, weighted 1 2 1 along both
-    /// axes, in 16 bits. This is a blur with a standard deviation of 0.71 px.
+    /// Returns the page with a blur like that of a lens: each pixel averaged with its neighbours,
+    /// weighted 1 2 1 along both axes, in 16 bits. This is a blur with a standard deviation of 0.71
+    /// px.
     ///
     /// Corners are located with a model of blurred edges. A single grey value determines the position of a sharp edge
     /// along the pixels, and the model would then be off by up to a quarter of a pixel.

@@ -41,12 +41,12 @@ impl Pdf {
         let visible = page.intersected_crop_box();
         let unit: f64 = page.raw().get::<f64>("UserUnit").unwrap_or(1.0) * MM_PER_PT;
         let size = DVec2::new(visible.width(), visible.height()) * unit;
-        // Rotated by 90° or 270° if the render size says so.
+        // The page is rotated by 90° or 270° if its rendered width and height are swapped.
         let (upright, shown) = (page.base_dimensions(), page.render_dimensions());
         if upright == shown { size } else { size.yx() }
     }
 
-    /// Renders a page at a resolution; what is not rendered by the time `end` stays white.
+    /// Renders a page at a resolution; parts not rendered before `end` stay white.
     pub(super) fn render(&self, index: usize, px_per_mm: f64, end: Option<Instant>) -> Gray<u8> {
         let page = &self.0.pages()[index];
         let DVec2 { x: width_mm, y: height_mm } = self.size_mm(index);

@@ -80,8 +80,8 @@ impl Png {
     }
 }
 
-/// Returns the means of squares of `side` × `side` pixels; squares that extend beyond the right or lower edge count
-/// white there.
+/// Returns the means of squares of `side` × `side` pixels; squares that extend beyond the right or
+/// lower edge count as white there.
 fn means(image: &Gray<u8>, side: usize) -> Gray<u8> {
     let [width, height] = [image.width(), image.height()];
     let paper = u64::from(u8::MAX);

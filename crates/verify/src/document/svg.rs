@@ -42,8 +42,8 @@ impl Svg {
         self.size_mm
     }
 
-    /// Renders the page at a resolution; what is not rendered by the time `end` stays white. Returns an error if the
-    /// renderer panics.
+    /// Renders the page at a resolution; parts not rendered before `end` stay white. Returns an
+    /// error if the renderer panics.
     pub(super) fn render(&self, px_per_mm: f64, end: Option<Instant>) -> Result<Gray<u8>, String> {
         let [width, height] = self.size_mm.to_array().map(|mm| pixels(mm, px_per_mm));
         let scale = px_per_mm * self.size_mm.x / f64::from(self.tree.size().width());

@@ -54,7 +54,7 @@ pub enum BoardFinding {
         /// Panel id.
         panel: u32,
     },
-    /// The panel is not mirrored, although the target says so.
+    /// The panel is not mirrored, although the target states a mirrored panel.
     #[error("board {panel} is not mirrored, but should be")]
     NotMirrored {
         /// Panel id.

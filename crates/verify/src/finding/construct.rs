@@ -7,8 +7,8 @@ use serde::Serialize;
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum ConstructFinding {
-    /// The file has a construct that viewers may render differently. Other programs may then show something else than
-    /// this verification sees.
+    /// The file has a construct that viewers may render differently. Other programs may then show
+    /// something other than the page that is verified here.
     #[error("{place}: {construct} (viewers may render it differently)")]
     Construct {
         /// Its location, in the terms of the format.
@@ -21,7 +21,7 @@ pub enum ConstructFinding {
     OtherLine {
         /// Its location, such as `line 12`.
         place: String,
-        /// The beginning of the line found there, or that the file ends.
+        /// The beginning of the line found there, or a note that the file ends.
         found: String,
     },
     /// Content that is not visible on the page: text that differs from the target's, or marks beyond the page.

@@ -43,10 +43,10 @@ pub enum CutFinding {
     /// The plate of a board exceeds its stated size by more than any possible kerf.
     #[error("the cut outline implies a kerf of {by_mm:.3} mm, which is impossible for this target")]
     NoKerf {
-        /// By how much the first cut outline is larger than its finished plate, measured across the plate.
+        /// Excess of the first cut outline over its finished plate, measured across the plate.
         by_mm: f64,
     },
-    /// The drawing, rendered as by other programs, differs from its paths.
+    /// The drawing, rendered as in other programs, differs from its paths.
     #[error("the rendered drawing differs from its paths near ({:.2}, {:.2}) mm", at_mm.x, at_mm.y)]
     DrawnOtherwise {
         /// The location, from the lower left corner of the drawing.

@@ -1,6 +1,6 @@
 //! Deviations of an artifact as values, each with its location and numbers.
 //!
-//! Input: what a comparison found. Output: a [`Finding`], as a sentence and as JSON.
+//! Input: the result of a comparison. Output: a [`Finding`], as a sentence and as JSON.
 //!
 //! 1. `construct` is about a file; `board`, `tile` and `mark` are about a page; `fold` is about a net.
 //! 2. `mesh` is about meshes and bodies; `list` and `cut` are about files for other detectors and cutters.

@@ -9,8 +9,8 @@ use deltille_core::camera::{Camera, Pose};
 use deltille_core::targets::Panel;
 use deltille_files::export::mesh::{MIN_TEXELS_PER_BIT, UNTAGGED_CELLS};
 
-/// Tolerance of a corner of a neighbouring face seen at a grazing angle, mm: less than half a tile of any board
-/// detected like this.
+/// Tolerance of a corner of a neighbouring face seen at a grazing angle, mm: less than half a tile
+/// of any board that can be detected at such an angle.
 pub(super) const GRAZING_TOLERANCE_MM: f64 = 1.0;
 
 /// Largest size of a texture pixel that widens the tolerance, px of the image: coarser textures are never written.
@@ -27,8 +27,8 @@ const MAX_SIDE_PX: f64 = 4000.0;
 const DISTANCE: f64 = 6.0;
 const ASIDE: f64 = 1.2;
 
-/// Roll of the camera, 15°: no edge of a triangle or square runs along rows or columns of pixels, where samples would
-/// see it as steps.
+/// Roll of the camera, 15°: no edge of a triangle or square runs along rows or columns of pixels,
+/// where sampling would make it a staircase.
 const ROLL_RAD: f64 = std::f64::consts::PI / 12.0;
 
 /// Returns a camera in front of the stated position of a face, on a side from which nothing hides the face, if there

@@ -1,5 +1,5 @@
-//! Checks of a mesh that are independent of the print: its size, its vertices, whether it is closed, and what lies
-//! beside its faces.
+//! Checks of a mesh that are independent of the print: its size, its vertices, whether it is
+//! closed, and the triangles beside its faces.
 
 use std::collections::BTreeSet;
 

@@ -89,7 +89,7 @@ impl Texels<'_> {
         if !with_tiles && self.pattern.has_tile_at(at) {
             return false;
         }
-        // Around drawn edges: within the tolerance of positions, plus the smear of drawing.
+        // Around drawn edges: within the tolerance of positions, plus the smear of rendering.
         let smear_mm = EDGE_PX * texel_mm;
         let near_mm = smear_mm + MESH_TOLERANCE_MM;
         let field_mm = if self.fills_face { smear_mm } else { near_mm };
@@ -129,7 +129,7 @@ fn affine(texels: [DVec2; 3], flat: [DVec2; 3]) -> Option<DAffine2> {
 /// Returns the rows of a texture that a triangle shows in part, each with its columns. Texels are at integers.
 fn rows(corners: [DVec2; 3], texture: &Gray<u8>) -> impl Iterator<Item = (usize, Range<usize>)> {
     let (width, height) = (texture.width(), texture.height());
-    // From the first to past the last one within a distance of one of an extent.
+    // The range of texels that lie within one texel of an extent; its end is past the last of them.
     let reached = |[low, high]: [f64; 2], size: usize| {
         let last = size as f64 - 1.0;
         let first = (low - 1.0 + OPEN).ceil().clamp(0.0, last) as usize;

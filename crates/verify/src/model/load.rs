@@ -47,7 +47,7 @@ pub(crate) fn load(
     Ok(model)
 }
 
-/// Loads a `.glb`. Returns an error that says what is wrong with it.
+/// Loads a `.glb`. Returns an error that describes its problem.
 fn glb(bytes: &[u8], limits: &Limits) -> Result<Model, String> {
     let file = gltf::Gltf::from_slice(bytes).map_err(|error| format!("not glTF: {error}"))?;
     let blob = file.blob.as_deref().ok_or("it has no binary chunk")?;

@@ -138,7 +138,8 @@ impl Net {
         Some(Place { slot, vertices, space_from_page })
     }
 
-    /// Compares the positions of the faces with their own, and folded corners with stated ones.
+    /// Compares the position that each face reaches with its stated position, and folded corners
+    /// with stated ones.
     fn judge(&self, members: &[usize], places: BTreeMap<usize, Place>) -> Folded {
         let (mut findings, mut deviation_mm, mut misplaced) = (Vec::new(), 0.0f64, false);
         for &index in members {

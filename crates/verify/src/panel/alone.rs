@@ -16,8 +16,8 @@ pub(crate) const MATCH_EDGES: f64 = 0.25;
 /// Margin around the tiles of a panel that is detected alone, in edges: no corner lies this close to the outline.
 const ALONE_EDGES: f64 = 0.05;
 
-/// Returns the outline of what is kept of a panel without tags that is detected alone: its tiles and a small margin,
-/// mm.
+/// Returns the outline of the unmasked area of a panel without tags that is detected alone: its
+/// tiles and a small margin, mm.
 pub(crate) fn outline_alone(panel: &Panel) -> Vec<DVec2> {
     panel.outline_around_mm(ALONE_EDGES * panel.edge_mm)
 }

@@ -1,8 +1,9 @@
 //! Subpixel positions of the edges of tiles and cells.
 //!
-//! A pixel on an edge may have any grey value and says little on its own. But an edge displaced by d px causes d px²
-//! of excess or missing ink along each px of its length, whichever pixels it crosses. Over a square of pixels these
-//! add up, while rounding and smear of single pixels do not.
+//! A pixel on an edge may have any grey value, so a single pixel carries little information. But an
+//! edge displaced by d px causes d px² of excess or missing ink along each px of its length,
+//! whichever pixels it crosses. Over a square of pixels these add up, while rounding and smear of
+//! single pixels do not.
 
 use std::collections::BTreeMap;
 

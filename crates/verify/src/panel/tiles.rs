@@ -17,11 +17,11 @@ use deltille_core::family::{Decoder, Family};
 use deltille_core::lattice::{GridKind, Tile, Vertex};
 use deltille_core::targets::TagPlacement;
 
-/// One pixel in this many, along each axis, is enough to count pixels.
+/// Step between counted pixels along each axis, px.
 const COARSE: usize = 3;
 
-/// Tolerance of edge positions, px: twice the effect of rounding on edges along pixels, on rendered pages (0.02 mm at
-/// 300 dpi) and on pages resampled from others.
+/// Tolerance of edge positions, px: twice the effect of rounding on edges parallel to the pixel
+/// rows, on rendered pages (0.02 mm at 300 dpi) and on pages resampled from others.
 const MOVED_EDGE_PX: f64 = 0.25;
 const SMEARED_MOVED_EDGE_PX: f64 = 0.5;
 

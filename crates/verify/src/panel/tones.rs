@@ -4,7 +4,8 @@ use crate::finding::any::Finding;
 use crate::finding::board::BoardFinding;
 use crate::panel::placed::PlacedPanel;
 
-/// Tolerance of the ink in the centre of a tile from 0 or 1: the effect of rounding to 255 grey values.
+/// Maximum deviation of the ink in the centre of a tile from 0 or 1: the effect of rounding to 255
+/// grey values.
 const MAX_TONE_ERROR: f64 = 0.01;
 
 /// Difference of ink below which a sheet is called blank rather than faint.

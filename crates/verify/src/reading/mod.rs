@@ -2,7 +2,7 @@
 //!
 //! Input: file names and the source of their bytes. Output: the bytes, and the meaning of the names.
 //!
-//! 1. `names` says which file is part of which artifact, and `format` what an extension stands for.
+//! 1. `names` assigns files to artifacts, and `format` assigns formats to extensions.
 //! 2. `reader` reads artifacts from memory or disk, and runs third-party code on them.
 //! 3. `error` says why an artifact cannot be read.
 

@@ -98,8 +98,8 @@ fn depth_mm(page: &SheetPage, place: DVec2) -> f64 {
     (x - left).min(right - x).min(y - lower).min(upper - y)
 }
 
-/// Returns the ink of a page at a position of the sheet, averaged as by a pixel of the sheet: over as many samples as
-/// the page has pixels there.
+/// Returns the ink of a page at a position of the sheet, averaged over one pixel of the sheet, with
+/// one sample for each pixel of the page in it.
 fn ink(page: &Page, window: &SheetPage, place: DVec2, px_per_mm: f64) -> f64 {
     let middle = page.px_from_page(place + window.sheet_at_mm);
     let ratio = page.px_per_mm / px_per_mm;

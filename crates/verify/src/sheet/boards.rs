@@ -29,8 +29,8 @@ const MAX_MISSING: f64 = 0.25;
 /// Positions of the detected corners on a sheet, mm in the frame of the sheet: by panel id, then by corner id.
 pub(crate) type Seen = BTreeMap<u32, BTreeMap<u32, DVec2>>;
 
-/// Compares all panels of a page. Returns where on the page the first of them lies, and the positions of the corners
-/// found.
+/// Compares all panels of a page. Returns the map from stated to found page positions of the first
+/// panel, and the positions of the corners found.
 pub(super) fn check(
     verifier: &Verifier,
     page: &Page,
@@ -149,8 +149,9 @@ fn check_panel(
 
 /// Returns the page positions of the stated corners that were found, by corner id.
 ///
-/// The corners of a tagged panel must be labelled by its tags. An untagged panel has only its outline, which is
-/// useless once a corner is missing; corners are then matched by position.
+/// The corners of a tagged panel must be labelled by its tags. The labels of an untagged panel
+/// depend on its outline, which is useless once a corner is missing. Corners are then matched by
+/// position.
 fn found_corners(
     blurred: &Gray<u16>,
     detection: &Detection,

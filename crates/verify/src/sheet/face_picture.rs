@@ -1,4 +1,4 @@
-//! A face covered with ink by polygons, as a separate sheet.
+//! The image of a face with polygons filled in black, as a separate sheet.
 
 use glam::DVec2;
 

@@ -12,8 +12,8 @@ use deltille_layout::SheetLayout;
 /// Minimum edge of a tag cell in the image, px, so that it contains more than a few pixels.
 const CELL_PX: f64 = 8.0;
 
-/// A page with a side longer than stated by this factor is not rendered: at the possible resolution, its boards could
-/// not be seen.
+/// A page with a side longer than stated by this factor is not rendered: at the resolution that the
+/// size limit allows, its boards would be too small to detect.
 const MAX_ENLARGED: f64 = 10.0;
 
 /// A page of a document.

@@ -80,8 +80,8 @@ impl Findings {
     }
 }
 
-/// Whether a file has a construct that viewers may render differently, or a line other than the program writes, and
-/// is therefore not rendered. Hidden content alone does not prevent rendering.
+/// Whether a file has a construct that viewers may render differently, or a line that the program
+/// would not write. The file is then not rendered. Hidden content alone does not prevent rendering.
 pub(crate) fn refuse(findings: &[Finding]) -> bool {
     let refuses = |finding: &Finding| {
         use ConstructFinding::{Construct, OtherLine};

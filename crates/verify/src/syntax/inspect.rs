@@ -73,8 +73,8 @@ pub(crate) fn bodies(
     Ok((found.0, bodies))
 }
 
-/// Checks what the MuJoCo model at `path` uses of the inspected OBJ beside it, `mesh`: its textures, and its parts if
-/// there are several.
+/// Checks the textures, and the parts if there are several, that the MuJoCo model at `path` uses
+/// from the inspected OBJ beside it, `mesh`.
 ///
 /// # Errors
 ///
@@ -94,7 +94,7 @@ fn textures_of_mjcf(bytes: &[u8]) -> usize {
     std::str::from_utf8(bytes).map_or(1, |text| usda::textures_by(text, "<texture "))
 }
 
-/// Inspects a model that only places the mesh of an OBJ.
+/// Inspects a simulator model that contains only a reference to the mesh of an OBJ.
 fn model(bytes: &[u8], stated: &str) -> Result<Findings, String> {
     let mut found = Findings::default();
     usda::same_lines(text(bytes)?, stated, str::to_owned, &mut found);

@@ -7,13 +7,14 @@
 //! 2. `words` contains the texts that a file must carry.
 //! 3. `pages` contains the lists for PDF and SVG, `meshes` those for meshes and bodies, `png` that for pages and
 //!    textures.
-//! 4. `findings` collects the constructs that are not on the lists. `text` and `zlib` read what several formats
-//!    share.
+//! 4. `findings` collects the constructs that are not on the lists. `text` and `zlib` read the
+//!    elements that several formats share.
 //!
-//! A rendered file shows only what one program makes of it. Scripts, animations, print rules, layers, blend modes,
-//! vertex colours or a second scene make other programs show something else. Each format therefore has a list of the
-//! constructs that its writer here uses and the reader interprets exactly; anything else is named and rejected,
-//! whether known to be harmful or not.
+//! A rendering shows only how one program interprets a file. Scripts, animations, print rules,
+//! layers, blend modes, vertex colours or a second scene make other programs show something else.
+//! Each format therefore has a list of the constructs that its writer here uses and the reader
+//! interprets exactly; any other construct is reported and rejected, even if it is not known to be
+//! harmful.
 
 pub(super) mod findings;
 pub(super) mod inspect;

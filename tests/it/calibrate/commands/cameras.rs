@@ -233,7 +233,7 @@ fn a_change_of_zoom_ends_with_an_error_that_names_the_view() {
     assert!((focal(1) / focal(0) - 1.02).abs() < 1e-3, "{change}");
     let page = std::fs::read_to_string(folder.path().join("page.html")).unwrap();
     assert!(page.contains("The camera changed between views"));
-    // The uncertainty of a failed calibration is no measure of a change.
+    // The uncertainty of a failed calibration cannot show whether a change is significant.
     let result = output(folder.path(), "compare camera.json camera.json --distance 1m");
     let said = String::from_utf8(result.stderr).unwrap();
     assert!(said.contains("camera.json: the calibration failed: the camera changed"), "{said}");

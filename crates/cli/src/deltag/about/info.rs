@@ -19,7 +19,8 @@ pub struct Args {
     result_format: ResultFormat,
 }
 
-/// Rows and columns of the board used to express the size of a family; the board of the paper.
+/// Rows and columns of the board used to express the size of a family; it is the board in the
+/// Deltille publication.
 const BOARD: [u32; 2] = [10, 11];
 
 /// Counts the tags of a target with the default settings of `deltille`.

@@ -374,7 +374,7 @@ pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
     made.end(staged)
 }
 
-/// Reads the rig of a file, and why its calibration failed, if it did.
+/// Reads the rig in a file, and the reason why its calibration failed, if any.
 fn read_rig(path: &Path) -> anyhow::Result<(Estimate, Option<String>)> {
     let text = Limits::default().read_text(path)?;
     let found = saved::read_without_target(&text).with_context(|| path.display().to_string())?;

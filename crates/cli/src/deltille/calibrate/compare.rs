@@ -195,7 +195,7 @@ fn files(
             name => format!("{stem}-{name}.svg"),
         };
         let size_px = [camera.camera.width, camera.camera.height];
-        // An empty plot serves for the checks before the work.
+        // An empty plot is a placeholder for the checks before the computation.
         let nothing = Comparison::default();
         let found = found.get(index).unwrap_or(&nothing);
         files.push(text_file(name, comparison_svg(size_px, found)));

@@ -35,8 +35,8 @@ use deltille_core::words::{counted, shown};
 /// Interval between two passes over the folder.
 const PAUSE: Duration = Duration::from_millis(400);
 
-/// Time without changes after which an unreadable photograph is given up. Programs that are still writing one pause
-/// for less, and a user would not wait longer.
+/// Time without changes after which an unreadable photograph is skipped for good. Programs that are
+/// still writing a file pause for a shorter time, and a user would not wait longer.
 const GIVEN_UP: Duration = Duration::from_secs(3);
 
 /// Arguments of `deltille guide`.
@@ -316,7 +316,7 @@ impl Watch<'_> {
         let mut last = None;
         for path in there {
             self.check_interrupt()?;
-            // A file that disappeared meanwhile may come back.
+            // A file that has disappeared in the meantime may reappear.
             let Ok(about) = path.metadata() else { continue };
             let stamp = Stamp { bytes: about.len(), changed: about.modified().ok() };
             let now = SystemTime::now();
@@ -498,11 +498,12 @@ impl Watch<'_> {
     }
 }
 
-/// Number of views from which a failed calibration is explained; fewer are too few anyway.
+/// Minimum number of views at which a failed calibration is reported with its cause: with fewer
+/// views, a failure is expected.
 const ENOUGH_TO_TELL: usize = 3;
 
-/// Fewer views than these hardly reveal an unsuitable model: each view has six pose parameters of its own, and a
-/// wrong model shows in inconsistencies between views.
+/// Number of views below which an unsuitable model is hard to detect: each view has its own six
+/// pose parameters, and a wrong model causes inconsistencies between views.
 const FEW: usize = 8;
 
 fn excluded_line(left_out: &Excluded) -> String {

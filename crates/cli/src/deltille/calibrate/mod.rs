@@ -5,7 +5,8 @@
 //!
 //! 1. `guide` proposes the next photograph to take.
 //! 2. `one_camera` is `deltille calibrate`, and `rig` is `deltille rig`: their options and files.
-//! 3. `sightings` reads the common input: detections, the target or untagged board, and how it was printed.
+//! 3. `sightings` reads the common input: detections, the target or untagged board, and the
+//!    properties of its print.
 //! 4. `solving` calls the library with a given or selected model, and prints the uncertainty of the result.
 //! 5. `report_page` writes the report, with the photographs that it shows.
 //! 6. `compare` tests whether two results differ significantly.

@@ -27,7 +27,7 @@ use deltille::export::{CAMERA_FORMATS, CameraFormat, Written, calibration, saved
 use deltille::targets::TargetIdentity;
 use deltille_core::words::{counted, places, shown};
 
-/// Correlations from this value on are reported: such parameters can hardly be separated.
+/// Correlations of at least this magnitude are reported: these parameters can hardly be separated.
 const STRONG_CORRELATION: f64 = 0.98;
 
 /// Arguments of `deltille calibrate`.
@@ -179,7 +179,7 @@ impl Args {
         };
         for format in &self.format {
             if file.failed.is_some() && !format.is_own() {
-                // Other programs would ignore the reason.
+                // Files of other formats cannot state the reason for the failure.
                 log!(
                     "warning: --format {}: not written, because the calibration failed",
                     format.name()

@@ -237,7 +237,7 @@ impl Args {
             files.push(text_file(format!("{name}.yaml"), yaml));
         }
         if failed.is_some() {
-            // Only rig.json contains the reason of a failure.
+            // Only rig.json contains the reason for a failure.
             if !self.format.is_empty() || self.refine_target || found.map.is_some() {
                 log!(
                     "warning: only rig.json and the cameras were written, because the calibration failed"
@@ -317,7 +317,8 @@ fn check_folders(cameras: &[(String, PathBuf)]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Rejects images that another camera has too: two cameras never detect exactly the same corners.
+/// Rejects images that also belong to another camera: two cameras never detect exactly the same
+/// corners.
 fn check_own(
     name: &str,
     detections: &[(String, Detection)],

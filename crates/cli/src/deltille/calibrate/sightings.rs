@@ -26,7 +26,7 @@ use deltille::targets::{SIDES, Target, TargetIdentity, parse_length_mm};
 use deltille_core::quantity::{edge_mm, print_scale};
 use deltille_core::words::counted;
 
-/// Detections and what they show.
+/// Detections and their target.
 #[derive(clap::Args)]
 pub struct SightingsArgs {
     /// Detections (.json or .parquet) from `deltille detect`, or folders of them
@@ -145,7 +145,7 @@ impl SightingsArgs {
         self.assume_target
     }
 
-    /// Reads all input. To measure the target, only views with certain labels are used.
+    /// Reads all input. To measure the target, only views with unambiguous labels are used.
     pub fn read(&self, measure_target: bool) -> anyhow::Result<Sightings> {
         let limits = self.limits.limits();
         let target = self.target.as_deref().map(|path| target_file::read_placed(path, &limits));
@@ -308,7 +308,7 @@ pub fn read(
         copies.extend(add(&mut detections, &mut files, (name, found), path));
     }
     for Tables { files: of_table, folder } in tables {
-        // Counted twice together with the JSON detections.
+        // The tables repeat the JSON detections in the same folder, which would then count twice.
         if let Some(one) =
             folder.and_then(|folder| files.iter().find(|file| file.parent() == Some(&folder)))
         {

@@ -21,7 +21,8 @@ pub fn files(folder: &Path) -> [PathBuf; 2] {
     [CORNERS, IMAGES].map(|table| folder.join(format!("{table}.{EXTENSION}")))
 }
 
-/// Tables being written. Images are written in order, whichever is finished first.
+/// Tables being written. Images are written in order, regardless of the order in which they are
+/// finished.
 pub struct Tables {
     folder: PathBuf,
     state: Mutex<State>,

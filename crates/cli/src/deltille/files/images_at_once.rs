@@ -18,8 +18,8 @@ pub fn for_each(
 ) {
     let images = Mutex::new(images.enumerate());
     let memory = Memory { most: limits.max_pixels, used: Mutex::default(), freed: Condvar::new() };
-    // The threads of the pool never wait for memory: a waiting thread would delay the images of others, because it
-    // works on parts of them.
+    // The threads of the pool never wait for memory: a waiting thread would delay other images,
+    // because each thread also works on parts of these.
     std::thread::scope(|scope| {
         for _ in 0..pool.current_num_threads() {
             scope.spawn(|| {

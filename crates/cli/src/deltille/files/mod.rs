@@ -1,7 +1,7 @@
 //! Input and output files of all commands.
 //!
-//! Input: paths and patterns from the arguments. Output: the contents of these files, and files that are written all
-//! or none.
+//! Input: paths and patterns from the arguments. Output: the contents of these files, and files
+//! that are written completely or not at all.
 //!
 //! 1. `limits` contains the options that limit how much of a file is read.
 //! 2. `images` finds the input photographs. `images_at_once` processes as many in parallel as memory allows.

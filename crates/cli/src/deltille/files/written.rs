@@ -1,4 +1,4 @@
-//! Output files of a command, written all or none.
+//! Output files of a command: either all are written, or none.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -89,7 +89,7 @@ pub fn drawn(name: &str, artwork: Artwork, formats: Formats, dpi: u32) -> Vec<Fi
     files
 }
 
-/// Whether two paths, of an output file and an existing file, are the same file.
+/// Whether the paths of an output file and of an existing file refer to the same file.
 pub fn same_file(written: &Path, other: &Path) -> bool {
     let [written, other] = [written, other].map(|path| path.canonicalize().ok());
     written.is_some() && written == other

@@ -83,7 +83,7 @@ fn range(text: &str) -> Result<[f64; 2], String> {
     }
 }
 
-/// Proposes a board and prints where it can be used.
+/// Proposes a board and prints the distances at which it can be used.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (focal_px, size_px) = match (&args.camera, args.size) {
         (Some(path), _) => {

@@ -449,7 +449,8 @@ fn one_image(
     Ok(Found { line, ink: found.ink, is_there, row })
 }
 
-/// Describes the detections in an image in one line, and why there are not more.
+/// Describes the detections in an image in one line, and the reasons why corners or tags are
+/// missing.
 fn summary(path: &Path, found: &Detection) -> String {
     let corners: usize = found.grids.iter().map(|grid| grid.corners.len()).sum();
     let tags: usize = found.grids.iter().map(|grid| grid.tags.len()).sum();

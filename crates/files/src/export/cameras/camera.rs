@@ -27,7 +27,8 @@ pub struct FormatError {
     models: String,
 }
 
-/// A model of another program: our largest model that it represents, its number of coefficients, and its name there.
+/// A lens model of another program: the largest of our models that it covers, its number of
+/// coefficients, and its name in that program.
 type Theirs = (Model, usize, &'static str);
 
 /// All coefficients of the lens.

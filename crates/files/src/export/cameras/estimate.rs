@@ -23,7 +23,8 @@ pub struct Print {
     pub ink: Option<InkEstimate>,
 }
 
-/// Whether a file lists the residual of every corner, which accounts for nearly all of its size.
+/// Whether a file lists the residual of every corner. These residuals take up nearly all of its
+/// size.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Residuals {
     /// Views contain only their number of corners and the RMS residual.
@@ -143,7 +144,7 @@ pub(in crate::export) struct DiagnosisRecord<'a> {
     rms_px: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     rms_mm: Option<f64>,
-    /// Delay of a camera, in frames, or frames in which labels were rotated.
+    /// Delay of a camera, in frames, or number of frames in which labels were rotated.
     #[serde(skip_serializing_if = "Option::is_none")]
     frames: Option<i32>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -161,7 +162,8 @@ pub(in crate::export) struct DiagnosisRecord<'a> {
     /// Radius up to which the lens model is usable, px.
     #[serde(skip_serializing_if = "Option::is_none")]
     monotonic_px: Option<f64>,
-    /// The quantity that was estimated instead of fixed, and the resulting RMS residual.
+    /// The remedy that was tried (another lens model, or a quantity estimated instead of fixed),
+    /// and the resulting RMS residual.
     #[serde(skip_serializing_if = "Option::is_none")]
     alternative: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -183,7 +185,8 @@ pub(in crate::export) struct DiagnosisRecord<'a> {
     shear_px: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     views: Option<usize>,
-    /// Ratio of the board's length along x to its length along y (1 as described), and its standard deviation.
+    /// Ratio of the board's length along x to its length along y, relative to the description (1 if
+    /// they agree), and its standard deviation.
     #[serde(skip_serializing_if = "Option::is_none")]
     ratio: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -248,7 +251,7 @@ pub(in crate::export) fn projection(camera: &CameraEstimate) -> Option<Projectio
 }
 
 /// Correlations of a covariance. With many parameters, only the lower triangle is written, to nine
-/// digits: the file of a fisheye spline would otherwise have 30 MB.
+/// digits: the file of a fisheye spline would otherwise take 30 MB.
 fn correlations_of(covariance: &Matrix, are_many: bool) -> Vec<Vec<f64>> {
     let c = covariance;
     let of = |i: usize, j: usize| c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt();
@@ -360,7 +363,7 @@ pub(in crate::export) fn map<'a>(estimate: &'a Estimate, found: &'a TargetMap) -
     }
 }
 
-/// Kinds of diagnoses in files that make a calibration unusable.
+/// Kinds of diagnoses, as files name them, that make a calibration unusable.
 const FAILURES: [&str; 5] =
     ["wrong_camera", "unusable_fit", "many_excluded", "many_panels_excluded", "changed_camera"];
 

@@ -1,4 +1,4 @@
-//! The formats of cameras and of rigs: each has a line in a table and a writer in [`super::camera`].
+//! The formats of cameras and of rigs: each has a row in a table and a writer in [`super::camera`].
 
 use super::camera::{
     COLMAP, FormatError, KALIBR, MRCAL, Models, NERFSTUDIO, OPENCV, ROS, colmap, colmap_rig,

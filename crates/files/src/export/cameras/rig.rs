@@ -110,7 +110,8 @@ struct Seen<'a> {
     views: Vec<ViewRecord<'a>>,
 }
 
-/// The JSON text of the calibration of a rig; `model` is the lens model of cameras without one of their own.
+/// The JSON text of the calibration of a rig; `model` is the lens model of cameras that do not
+/// specify a model.
 pub fn write(
     found: &Estimate,
     said: &[Diagnosis],

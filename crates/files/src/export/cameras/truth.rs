@@ -99,7 +99,7 @@ struct SavedTruth {
     corners: Vec<TruthCorner>,
 }
 
-/// Reads what [`write()`] wrote.
+/// Reads a text written by [`write()`].
 ///
 /// # Errors
 /// Returns an error if the text is not a ground truth, or if a field is not valid.

@@ -152,7 +152,7 @@ impl DetectionFile {
     }
 }
 
-/// Whether a text is JSON of another schema than a detection.
+/// Whether a text is JSON with a schema other than that of a detection.
 pub fn is_foreign(text: &str) -> bool {
     json::schema(text.as_bytes())
         .is_ok_and(|schema| schema.as_deref().map(json::kind) != Some(json::kind(SCHEMA)))
@@ -223,7 +223,7 @@ fn check_covariance([xx, xy, yy]: [f64; 3]) -> Result<(), String> {
         let in_range = quantity::variance_px2::RANGE.check(variance);
         in_range.map_err(|what| format!("`cov`: a variance, {what}"))?;
     }
-    // This comparison also refuses NaN.
+    // This comparison also rejects NaN.
     let usable = xx * yy > xy * xy;
     usable.then_some(()).ok_or_else(|| "`cov` is not a valid covariance xx, xy, yy".to_owned())
 }

@@ -1,4 +1,4 @@
-//! The formats of detections: each has a line in a table and a writer in this folder.
+//! The formats of detections: each has a row in a table and a writer in this folder.
 
 use super::{csv, detection, orpc};
 use crate::export::named::Format;

@@ -1,4 +1,4 @@
-//! Reader of `.tp` board poses, which belong to a `.dsc` whose boards are each given in their own plane.
+//! Reader of `.tp` board poses, for a `.dsc` that gives each board in its own plane.
 //!
 //! ```text
 //! # a comment line
@@ -84,8 +84,8 @@ pub fn read(text: &str) -> Result<Vec<(u32, PanelPose)>, TpError> {
     Ok(found)
 }
 
-/// Returns a target whose boards are each given in their own plane, with its boards at the poses of a text. Poses of other
-/// boards are ignored.
+/// Returns a target, read from a `.dsc` that gives each board in its own plane, with its boards at
+/// the poses of a text. Poses of other boards are ignored.
 ///
 /// # Errors
 /// Returns an error if the text is not valid, lacks a board, or gives two boards the same position.

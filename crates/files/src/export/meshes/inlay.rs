@@ -145,8 +145,8 @@ fn solid(target: &Target, solid: &Polyhedron, inlay_mm: f64) -> Result<[Body; 2]
     }
 }
 
-/// Maximum depth of an inlay at a position on a face, mm. It stays nearer to this face than to any other, so it meets no other
-/// inlay.
+/// Maximum depth of an inlay at a position on a face, mm. An inlay of at most this depth stays
+/// nearer to this face than to any other, so it meets no other inlay.
 fn deepest(place: DVec3, planes: &[(DVec3, DVec3)], face: usize) -> f64 {
     let inwards = planes[face].0;
     let others = planes.iter().enumerate().filter(|&(other, _)| other != face);

@@ -9,10 +9,10 @@ use deltille_layout::artwork::ArtworkError;
 /// Default depth of the inlay, mm: two layers of most printers.
 pub const INLAY_MM: f64 = 0.4;
 
-/// Minimum depth of an inlay, mm: no printer has thinner layers.
+/// Minimum depth of an inlay, mm: no printer makes thinner layers.
 pub const MIN_INLAY_MM: f64 = 0.05;
 
-/// Default number of texels along the edge of a cell of a tag, which is sharp in a close view.
+/// Default number of texels along the edge of a cell of a tag, enough for a sharp close-up view.
 pub const TEXELS_PER_BIT: f64 = 20.0;
 
 /// Maximum side of a texture, px, that graphics hardware of the last ten years accepts.
@@ -70,7 +70,7 @@ pub enum MeshError {
         asked: u32,
         /// Faces that carry a board.
         faces: usize,
-        /// Most textures.
+        /// Maximum number of textures.
         most: u32,
     },
     /// A board with two sides, where one side is needed.

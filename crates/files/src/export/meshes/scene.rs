@@ -87,8 +87,8 @@ fn mjcf_material(name: &str, texture: &str) -> String {
     )
 }
 
-/// `<name>.usda`, a mesh in metres, z up, with a `UsdPreviewSurface`; several textures have one each on a subset of the faces.
-/// Triangles do not share corners, so normals are exact.
+/// `<name>.usda`, a mesh in metres, z up, with a `UsdPreviewSurface`. With several textures, there
+/// is one for each, on a subset of the faces. Triangles do not share corners, so normals are exact.
 pub fn usda(mesh: &TexturedMesh) -> String {
     let count = mesh.textures.len();
     let faces = || (0..count).flat_map(|texture| mesh.faces_of(texture));

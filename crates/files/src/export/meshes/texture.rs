@@ -1,9 +1,8 @@
 //! The sizes of the textures of a mesh, and the faces on each texture.
 //!
 //! ```text
-//!   faces  0 1 2 3 4 5 6 7 8     in order, shared so that all textures have about the same area
-//!          ╰──╮──╯ ╰─╮─╯ ╰╮╯     and the same sharpness
-//!   texture   1      2    3
+//! faces 0 1 2 3 4 5 6 7 8 in order, divided so that all textures have about the same area ╰──╮──╯
+//! ╰─╮─╯ ╰╮╯ and the same sharpness texture 1 2 3
 //! ```
 
 use std::ops::Range;

@@ -1,5 +1,5 @@
-//! SVG for a laser or a plotter, in true size: engraved areas are filled in black, and cut lines are red hairlines. There is no
-//! paper background, because a laser would engrave it.
+//! SVG for a laser or a plotter, at true size: engraved areas are filled in black, and cut lines
+//! are red hairlines. There is no paper background, because a laser would engrave it.
 //!
 //! The reader accepts only files in the form of the writer, so nothing can move, hide or scale the cut lines.
 
@@ -20,7 +20,8 @@ const HAIRLINE_MM: f64 = 0.01;
 /// Layers with the names of their paths, in drawing order.
 const LAYERS: [(CutLayer, &str); 2] = [(CutLayer::Engrave, "engrave"), (CutLayer::Cut, "cut")];
 
-/// Returns the text of the SVG of a drawing with closed paths; paths on other layers than these two are left out.
+/// Returns the text of the SVG of a drawing with closed paths; paths on layers other than these two
+/// are omitted.
 pub fn text(drawing: &CutDrawing, title: &str, subject: &str) -> String {
     let [left, lower, right, upper] = drawing.bounds_mm().unwrap_or_default();
     let [width, height] = [right - left, upper - lower].map(|mm| number(mm + 2.0 * AROUND_MM));

@@ -1,9 +1,11 @@
 //! PDF: all sheets in one file, one page each.
 //!
-//! Black is pure K (CMYK). A finish may name spot colours: a white beneath the whole page, and a colour for cut lines. All of
-//! them overprint, so no separation has holes under another. Devices without these inks show the white as paper and the lines as
-//! black. The page boxes have the size of the page in points, and viewers are asked to print without scaling. The same artwork
-//! gives the same bytes: there are no dates, and the identifier of the file is a digest of its content.
+//! Black is pure K (CMYK). A finish may name spot colours: a white beneath the whole page, and a
+//! colour for cut lines. All of them overprint, so no separation is knocked out under another.
+//! Devices without these inks show the white as paper and the lines as black. The page boxes have
+//! the size of the page in points, and viewers are asked to print without scaling. The same artwork
+//! gives the same bytes: there are no dates, and the identifier of the file is a digest of its
+//! content.
 
 use std::path::Path;
 

@@ -24,7 +24,7 @@ static MOVING: Mutex<()> = Mutex::new(());
 pub struct WriteError {
     /// The requested file.
     pub path: PathBuf,
-    /// The error of the system.
+    /// The error of the operating system.
     pub source: io::Error,
 }
 
@@ -214,7 +214,8 @@ pub(in crate::export) fn sync_folder(folder: &Path) {
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
 }
 
-/// Checks that a write to `path` would replace only a file, or a symbolic link itself. The system handles folders.
+/// Checks that a write to `path` would replace only a file, or a symbolic link itself. For a
+/// folder, the write itself fails.
 ///
 /// # Errors
 /// Returns an error if the path is a device or a pipe, or leads to one.
@@ -255,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn several_files_are_written_all_or_none() {
+    fn several_files_are_written_together_or_not_at_all() {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
         let files =

@@ -37,7 +37,7 @@ pub struct Kind(Is);
 
 #[derive(Clone, Debug)]
 enum Is {
-    /// A JSON with this schema.
+    /// A JSON file with this schema.
     Schema(String),
     /// A kind described by these words.
     Words(String),
@@ -244,7 +244,7 @@ impl<'a> Png<'a> {
     }
 }
 
-/// The name and the data of the first chunk of a PNG, and what follows it.
+/// The name and the data of the first chunk of a PNG, and the bytes after it.
 fn next_chunk(bytes: &[u8]) -> Option<(&[u8], &[u8], &[u8])> {
     let (length, after) = bytes.split_first_chunk::<4>()?;
     let (name, after) = after.split_at_checked(4)?;

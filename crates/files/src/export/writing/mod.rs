@@ -1,4 +1,5 @@
-//! Files on disk: [`atomic`] writes one file, [`staging`] a set, all or none; [`kind`] recognises files before they are replaced.
+//! Files on disk: [`atomic`] writes one file, [`staging`] writes a set completely or not at all;
+//! [`kind`] recognises files before they are replaced.
 
 pub mod atomic;
 pub mod kind;

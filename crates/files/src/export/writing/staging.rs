@@ -1,4 +1,4 @@
-//! Staging: a set of files that appears as one.
+//! Staging: a set of files that appears as one unit.
 //!
 //! All files are first written to a temporary folder `.deltille-writing-…` beside their final
 //! paths, and flushed to the disk. Then the empty file `complete` is added, after which the set

@@ -1,7 +1,8 @@
 //! The offset of each corner on its panel that would explain its residuals, and the RMS of the residuals.
 //!
 //! An offset d of a corner in the plane of its panel causes the residual r = J d, with J the
-//! derivative of the pixel by the offset. The least-squares offset over all views of the corner is
+//! derivative of the pixel with respect to the offset. The least-squares offset over all views of
+//! the corner is
 //!
 //! ```text
 //!     d = (Σ JᵀJ)⁻¹ Σ Jᵀ r      covariance σ² (Σ JᵀJ)⁻¹

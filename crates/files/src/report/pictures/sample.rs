@@ -16,7 +16,7 @@ use deltille_core::raster::Gray;
 /// Longest side of the images, px.
 const SIDE: usize = 520;
 
-/// Maximum field of view, rad: a wider one would leave most of the image to its border.
+/// Maximum field of view, rad: in a wider one, the stretched border would fill most of the image.
 const WIDEST_RAD: f64 = 110.0 / 180.0 * std::f64::consts::PI;
 
 /// Angle from the axis within which corners lie inside that field of view, rad.

@@ -136,7 +136,7 @@ impl Axes {
         self.body.push_str(element);
     }
 
-    /// Adds a dot of a CSS class; the radius is in user units.
+    /// Adds a dot with a CSS class; the radius is in user units.
     pub(super) fn dot(&mut self, point: DVec2, radius: f64, class: &str) {
         let DVec2 { x: cx, y: cy } = self.at(point);
         let _ = write!(
@@ -154,7 +154,7 @@ impl Axes {
         );
     }
 
-    /// Adds a polyline of a CSS class.
+    /// Adds a polyline with a CSS class.
     pub(super) fn line(&mut self, points: &[DVec2], class: &str) {
         let places = points.iter().map(|&point| {
             let DVec2 { x, y } = self.at(point);
@@ -164,7 +164,8 @@ impl Axes {
         let _ = write!(self.body, "<polyline class=\"{class}\" points=\"{}\"/>", places.join(" "));
     }
 
-    /// Adds a rectangle of a CSS class between two opposite corners; `style` contains further attributes.
+    /// Adds a rectangle with a CSS class between two opposite corners; `style` contains further
+    /// attributes.
     pub(super) fn bar(&mut self, low: DVec2, high: DVec2, class: &str, style: &str) {
         let (low, high) = (self.at(low), self.at(high));
         let (DVec2 { x, y }, size) = (low.min(high), (high - low).abs());

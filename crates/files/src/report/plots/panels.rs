@@ -8,7 +8,7 @@ use glam::DVec2;
 use deltille_calibrate::PanelRef;
 use deltille_core::statistics::median;
 
-/// Margin around every panel, user units; below, it holds the name of the panel.
+/// Margin around every panel, user units; the margin below contains the name of the panel.
 const MARGIN: f64 = 26.0;
 
 /// Maximum number of panels in a row.

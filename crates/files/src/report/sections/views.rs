@@ -34,8 +34,8 @@ fn order(camera: &CameraEstimate) -> Vec<usize> {
     order
 }
 
-/// The section about the views of a camera: the worst as images with enlarged residuals, and all, including
-/// held-out views, in a folded table.
+/// The section about the views of a camera: the worst as images with enlarged residuals, and all,
+/// including held-out views, in a collapsible table.
 pub(in crate::report) fn section(report: &Report, index: usize, survey: &Survey) -> String {
     let camera = &report.estimate.cameras[index];
     let (order, all) = (order(camera), camera.views.len());
@@ -163,7 +163,7 @@ fn row(
 
 /// Where the image of a view is shown. An image that is shown twice is embedded once.
 enum Shown {
-    /// In the table alone.
+    /// Only in the table.
     Only,
     /// In a card, with an id for its image, and residuals enlarged by a factor.
     First { id: String, enlarged: f64 },

@@ -21,8 +21,8 @@ use crate::photographs::world::mips::{Footprint, Mips};
 use crate::photographs::world::page::PrintedPage;
 use deltille::raster::Gray;
 
-/// Returns the number of samples along a pixel, proportional to the inverse of the blur and limited to 4 … 8. Only four
-/// samples per pixel at the usual blur displaced edges by 0.002 px.
+/// Returns the number of samples along a pixel, proportional to the inverse of the blur and limited
+/// to 4 … 8. With only four samples per pixel at the usual blur, edges were displaced by 0.002 px.
 fn subpixels(blur_px: f64) -> usize {
     ((5.6 / blur_px.max(f64::EPSILON)).round() as usize).clamp(4, 8)
 }

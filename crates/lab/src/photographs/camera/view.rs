@@ -66,7 +66,8 @@ pub struct Curl {
 }
 
 impl View {
-    /// Returns the position on the page that a pixel sees, mm; `None` if it looks past the bent sheet.
+    /// Returns the position on the page that a pixel sees, mm; `None` if its ray misses the bent
+    /// sheet.
     pub fn page_from_px(&self, px: DVec2) -> Option<DVec2> {
         let Some(curl) = self.curl else { return self.table_from_px(px) };
         let place = curl.hit(self.place.eye_mm, self.ray(px))?;

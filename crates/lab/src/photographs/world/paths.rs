@@ -1,7 +1,8 @@
 //! Vertices of the paths of a PDF page, from the operators of its content stream.
 //!
-//! The parser supports only what filled paths need: the matrix of the graphics state, moves, lines, curves, rectangles
-//! and closing of contours. It ignores text, images and nested forms.
+//! The parser supports only the operators that filled paths need: the matrix of the graphics state,
+//! moves, lines, curves, rectangles and closing of contours. It ignores text, images and nested
+//! forms.
 
 use glam::DVec2;
 use lopdf::content::Content;
@@ -122,7 +123,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn matrices_are_followed_and_contours_counted() {
+    fn matrices_are_applied_and_contours_counted() {
         let stream = b"q 2 0 0 2 72 0 cm 0 0 m 36 0 l 36 36 l h f Q 72 0 m 144 72 l 72 72 l f";
         let vertices = Vertices::of(&Content::decode(stream).unwrap());
         let meeting = |x: f64, y: f64| vertices.meeting(DVec2::new(x, y), 0.01);

@@ -59,8 +59,8 @@ pub(in crate::syntax) fn check(
         found.add("the JSON", "a list in place of an object or within a list");
         return Ok(found);
     }
-    // If a key is repeated or spelled with escapes, readers differ in which value they take. The JSON must therefore
-    // equal its own values written again.
+    // If a key is repeated or spelled with escapes, readers differ in which value they take. The
+    // JSON must therefore equal its own values after they are written again.
     let rewritten = value.to_string();
     let filled = rewritten.len().next_multiple_of(4) == json.len();
     if !filled || json.trim_ascii_end() != rewritten.as_bytes() {
@@ -149,8 +149,8 @@ struct Inspection<'a> {
 }
 
 impl Inspection<'_> {
-    /// Checks that there is only one of each thing of which the reader takes the first, one material and image for
-    /// each texture, and that views and accessors lie within the binary chunk.
+    /// Checks that a list contains one entry if the reader uses only its first, that each texture
+    /// has one material and one image, and that views and accessors lie within the binary chunk.
     fn counts(&mut self) {
         let root = self.root;
         let version = &root.asset.version;
@@ -330,7 +330,7 @@ impl Inspection<'_> {
         }
     }
 
-    /// Checks that every material, accessor and view is used by what is shown.
+    /// Checks that the visible scene uses every material, accessor and view.
     fn unused(&mut self) {
         let root = self.root;
         let primitives = || root.meshes.iter().flat_map(|mesh| &mesh.primitives);
@@ -415,7 +415,7 @@ impl Inspection<'_> {
         values.iter().all(|value| value.is_finite()).then_some(values)
     }
 
-    /// Checks that the stated bounds of positions are correct: viewers skip what lies outside.
+    /// Checks that the stated bounds of positions are correct: viewers skip geometry outside them.
     fn bounds(&mut self, index: usize, values: &[f32]) {
         let accessor = &self.root.accessors[index];
         let bound = |pick: fn(f32, f32) -> f32| -> Vec<f32> {
@@ -553,7 +553,7 @@ mod tests {
     }
 
     #[test]
-    fn motions_keep_shapes_and_mirrors_do_not() {
+    fn rigid_motions_preserve_shapes_and_reflections_do_not() {
         for json in [
             "{}",
             r#"{"translation": [1, 2, 3], "rotation": [0, 0, 1, 0], "scale": [2, 2, 2]}"#,

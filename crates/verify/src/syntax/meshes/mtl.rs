@@ -68,7 +68,7 @@ pub(super) fn check(text: &str) -> (Vec<Material>, Findings) {
     (materials, found)
 }
 
-/// Reports what a material lacks.
+/// Reports the statements that a material lacks.
 fn end(material: Option<&Material>, stated: &[&str], found: &mut Findings) {
     let Some(material) = material else { return };
     for line in STATED {

@@ -68,8 +68,9 @@ pub(in crate::syntax) fn check(
     Ok((found, parts))
 }
 
-/// Compares what a MuJoCo model with `count` textures uses of an inspected OBJ: textures with the usual names, and if
-/// there are several, a part of the mesh for each in a separate OBJ.
+/// Checks the files that a MuJoCo model with `count` textures uses beside an inspected OBJ:
+/// textures with the usual names and, if there are several, a separate OBJ for each with its part
+/// of the mesh.
 ///
 /// # Errors
 ///

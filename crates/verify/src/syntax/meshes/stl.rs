@@ -1,5 +1,6 @@
-//! Inspection of binary STL for what every reader interprets the same way: the header that the program writes, and
-//! triangles without attributes, which some readers interpret as colours.
+//! Inspection of binary STL. Every reader must interpret the file the same way, so it may contain
+//! only the header that the program writes, and triangles without attributes, which some readers
+//! interpret as colours.
 
 use crate::syntax::findings::Findings;
 use deltille_files::export::stl::header;

@@ -269,7 +269,7 @@ mod tests {
     use deltille_files::export::threemf::{INLAY, to_bytes};
 
     #[test]
-    fn the_build_item_stands_at_the_origin_and_lines_are_xml() {
+    fn the_build_item_is_at_the_origin_and_only_xml_white_space_is_accepted() {
         let spec = BoardSpec { tags: None, ..BoardSpec::new(GridKind::Deltille, 4, 5, 20.0) };
         let target = Target::build("b", &TargetSpec::Board(spec), None).unwrap();
         let file = to_bytes(&InlaidBodies::new(&target, Meshing::default()).unwrap());

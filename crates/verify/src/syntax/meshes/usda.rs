@@ -92,7 +92,7 @@ fn list_of(line: &str) -> String {
     format!("{}{}", &line[..from], &line[to..])
 }
 
-/// Returns where the brackets of a list begin and end.
+/// Returns the range of a list in a line, including its brackets.
 fn brackets(line: &str) -> [usize; 2] {
     let from = line.find("= [").map_or(0, |at| at + 2);
     let to = line.rfind(']').map_or(from, |at| at + 1);
@@ -134,7 +134,7 @@ pub(crate) fn list(line: &str) -> Option<(&'static str, Vec<f64>)> {
         numbers.extend(entry(&rest[..end])?);
         rest = match &rest[end..] {
             "" => "",
-            // Something must follow.
+            // A value must follow the comma.
             next => next.strip_prefix(", ").filter(|next| !next.is_empty())?,
         };
     }

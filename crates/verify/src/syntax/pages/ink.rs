@@ -8,8 +8,8 @@ use kurbo::{BezPath, PathEl, Shape};
 /// Problem of marks outside the page: some viewers show more than the page, including these marks.
 pub(super) const OFF_PAGE: &str = "a mark that extends beyond the page";
 
-/// Maximum length of all contours per area of the page, 1/mm: even tags in all tiles, with cells of 0.1 mm, have
-/// less.
+/// Maximum length of all contours per area of the page, 1/mm: even a page with tags in all tiles
+/// and cells of 0.1 mm has less.
 const MAX_PER_MM: f64 = 40.0;
 
 /// Maximum total area of strokes and of the rectangles around filled paths, in page areas: those of tiles and cells
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mark_is_drawn_once() {
+    fn duplicate_marks_are_detected() {
         let mut ink = Ink::new(DVec2::splat(100.0), 1.0);
         let mut add = |path: &str, pen| ink.add(&BezPath::from_svg(path).unwrap(), pen);
         assert_eq!(add("M0,0 L20,0 L10,17 z", None), None);

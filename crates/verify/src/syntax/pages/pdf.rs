@@ -94,8 +94,8 @@ fn head(bytes: &[u8], found: &mut Findings) {
     found.add("the header", format!("version {version} instead of {VERSION}"));
 }
 
-/// Checks that every object begins at its offset in the cross-reference table. Otherwise readers that rebuild the
-/// table would find other objects than readers that follow it.
+/// Checks that every object begins at its offset in the cross-reference table. Otherwise, readers
+/// that rebuild the table and readers that follow it would find different objects.
 fn table(document: &Document, bytes: &[u8], found: &mut Findings) {
     for (number, entry) in &document.reference_table.entries {
         let &XrefEntry::Normal { offset, generation } = entry else { continue };
@@ -106,8 +106,8 @@ fn table(document: &Document, bytes: &[u8], found: &mut Findings) {
     }
 }
 
-/// Checks that the parsed objects, written again, reproduce the file byte by byte: the reader neither skipped nor
-/// repaired anything.
+/// Checks that the parsed objects, written again, reproduce the file byte for byte: the reader
+/// neither skipped nor repaired anything.
 fn check_rewrite(document: &mut Document, bytes: &[u8], found: &mut Findings) {
     let mut rewritten = Vec::with_capacity(bytes.len());
     let written = document.save_to(&mut rewritten).is_ok();

@@ -21,7 +21,7 @@ const WORDS: usize = 3;
 /// The effect of an operator on the current path.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Role {
-    /// Sets what paths are painted with, between paths.
+    /// Sets the colour or line width of later paths; allowed only between paths.
     State,
     /// Begins a contour.
     Begin,
@@ -59,7 +59,7 @@ const FARTHEST_PT: f64 = 1e5;
 /// Distance by which a path may extend beyond the page, points: coordinates are rounded.
 const EDGE_SLACK_PT: f64 = 0.01;
 
-/// What the content of a page must agree with.
+/// The properties that the content of a page must have.
 pub(super) struct Content<'a> {
     /// Width and height, points.
     pub size_pt: DVec2,
@@ -165,7 +165,7 @@ struct Painter<'a> {
 }
 
 impl Painter<'_> {
-    /// Executes an operator. Returns whether what it paints, if anything, is on the page.
+    /// Executes an operator. Returns whether the mark that it paints, if any, is on the page.
     ///
     /// # Errors
     ///

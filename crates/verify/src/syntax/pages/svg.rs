@@ -97,7 +97,8 @@ pub(in crate::syntax) fn check(
         }
         let on_page = !node.is_element() || is_on_page(&node, &view);
         let is_listed = constructs.is_empty() && on_page;
-        // Counting lines starts at the first one, so count only for findings.
+        // Counting lines starts at the first line of the file, so line numbers are computed only
+        // for findings.
         if !is_listed && !found.is_full() {
             let place = format!("line {}", document.text_pos_at(node.range().start).row);
             constructs.into_iter().for_each(|construct| found.add(&place, construct));
@@ -164,8 +165,8 @@ struct View {
 }
 
 impl View {
-    /// Returns the view of an SVG. Returns `None` if its size is not in mm, or if the `viewBox` has other proportions
-    /// than the page, so that viewers would have to choose a scale.
+    /// Returns the view of an SVG. Returns `None` if its size is not in mm, or if the `viewBox` has
+    /// a different aspect ratio from the page, so that viewers would have to choose a scale.
     fn of(svg: &Node) -> Option<Self> {
         let [width, height] = ["width", "height"].map(|key| length(svg.attribute(key)?));
         let ends = svg.attribute("viewBox")?.split(' ').map(decimal).collect::<Option<Vec<_>>>()?;

@@ -162,7 +162,7 @@ pub struct BoardSettings {
     /// Thickness of the plate in a mesh, parsed by [`PlateMeshes`].
     #[arg(skip)]
     plate: Option<String>,
-    /// Meshes, also parsed by it.
+    /// The requested meshes, also parsed by [`PlateMeshes`].
     #[arg(skip)]
     #[serde(skip_serializing_if = "is_usual")]
     meshes: Meshes,
@@ -270,7 +270,7 @@ impl BoardSettings {
             png,
             dsc,
             dsc_dialect: self.dsc_dialect.or(template.dsc_dialect),
-            // Unused if the options select other formats than the template.
+            // Unused if the options select formats other than those of the template.
             dpi: self.dpi.or(template.dpi.filter(|_| png || !template.png)),
             note: self.note.or(template.note),
             logo: self.logo.or(template.logo),
@@ -404,7 +404,7 @@ impl BoardSettings {
         ]
     }
 
-    /// Returns the settings with the chosen edge length, so that a template gives the same board again.
+    /// Returns the settings with the chosen edge length, so that the template reproduces the board.
     pub fn with_edge(self, edge_mm: f64) -> Self {
         Self { edge: Some(format!("{edge_mm}mm")), ..self }
     }

@@ -144,7 +144,7 @@ impl Meshes {
             ("--plate", plate.is_some(), any, "a mesh, such as --gltf"),
             ("--inlay", self.inlay.is_some(), self.threemf, "--3mf"),
         ])?;
-        // A template may contain what the option parser would reject.
+        // A template may contain combinations that the option parser would reject.
         if self.texture.is_some() && self.texture_dpi.is_some() {
             bail!("--texture conflicts with --texture-dpi; remove one of them");
         }

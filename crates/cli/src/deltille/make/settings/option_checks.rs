@@ -4,7 +4,8 @@ use anyhow::{Context, bail};
 
 use deltille::targets::parse_length_mm;
 
-/// Rejects the first option that is given but unused; the last element of each entry says what it needs.
+/// Rejects the first option that is given but unused; the last element of each entry names the
+/// option that it requires.
 pub fn refuse_idle(options: &[(&str, bool, bool, &str)]) -> anyhow::Result<()> {
     match options.iter().find(|(_, is_given, is_used, _)| *is_given && !is_used) {
         Some((option, .., needed)) => {

@@ -224,7 +224,7 @@ impl SolidSettings {
             pdf: self.pdf || (template.pdf && !formats),
             svg: self.svg || (template.svg && !formats),
             png,
-            // Unused if the options select other formats than the template.
+            // Unused if the options select formats other than those of the template.
             dpi: self.dpi.or(template.dpi.filter(|_| png || !template.png)),
             size: self.size.or(template.size),
             mesh: self.mesh.or(template.mesh),

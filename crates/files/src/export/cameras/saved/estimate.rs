@@ -119,7 +119,7 @@ fn frames_of(views: &[SavedView]) -> Vec<FrameEstimate> {
     frames.collect()
 }
 
-/// A calibrated camera on other views, whose poses alone were estimated.
+/// A known camera evaluated on other views, in which only the poses were estimated.
 fn known(
     found: &CameraEstimate,
     rms_px: f64,

@@ -5,8 +5,8 @@
 //! 3. `estimate` converts the records into an [`Estimate`].
 //!
 //! Quantities that a file does not contain stay empty: corners (unless residuals were requested), findings and lack of fit
-//! (files describe them in words), and refined panel poses (they are in the refined target). The reason of an excluded view is
-//! the text of the file.
+//! (files describe them in words), and refined panel poses (they are in the refined target). The
+//! reason for excluding a view is the text in the file.
 
 mod error;
 mod estimate;

@@ -33,9 +33,9 @@
 //! neighbouring corners.
 //!
 //! Limits: the original dialect describes only triangular outlines. Neither dialect describes untagged or inverted boards, or
-//! tags in white squares. Of square tags, this crate has aprilTag16h5, 25h9 and 36h11; other families have no fingerprint here.
-//! The original program reads triangular tags with the code tables of square tags, so it indexes such boards only by its own
-//! codes.
+//! tags in white squares. This crate contains the square families aprilTag16h5, 25h9 and 36h11;
+//! other square families have no fingerprint here. The original program reads triangular tags with
+//! the code tables of square tags, so it indexes such boards only by its own codes.
 
 mod read;
 mod write;

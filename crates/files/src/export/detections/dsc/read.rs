@@ -14,7 +14,8 @@ use deltille_core::targets::{
 };
 use deltille_core::words::{counted, quoted};
 
-/// Maximum number of boards in a file, and of columns or rows of a board: a larger number is a typing error.
+/// Maximum number of boards in a file, and of columns or rows of a board: a larger number is taken
+/// for a typo.
 const MOST: u32 = 10_000;
 
 /// Relative tolerance of the unit inferred from the distances of corners.
@@ -112,7 +113,7 @@ impl<'a> Line<'a> {
         DscError::Line { line: self.number, problem: problem.into() }
     }
 
-    /// Returns the comma-separated fields, which must be `N`.
+    /// Returns the comma-separated fields; there must be exactly `N`.
     fn fields<const N: usize>(self, form: &str) -> Result<[&'a str; N], DscError> {
         let fields: Vec<&str> = self.text.split(',').map(str::trim).collect();
         fields.try_into().map_err(|_| self.fault(format!("{} is not `{form}`", quoted(self.text))))
@@ -152,7 +153,7 @@ struct ListedCorner<'a> {
 }
 
 impl<'a> Block<'a> {
-    /// Reads one block and returns what follows it.
+    /// Reads one block, and returns it with the remaining lines.
     fn read<'l>(lines: &'l [Line<'a>]) -> Result<(Self, &'l [Line<'a>]), DscError> {
         let head = lines[0];
         let [id, a, b, size] = head.fields("id,A,B,size")?;

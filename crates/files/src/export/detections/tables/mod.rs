@@ -54,7 +54,7 @@ const IMAGES_SCHEMA: &str = "deltille/images/1";
 const EARLIER_IMAGES: &str = "pictures";
 const EARLIER_IMAGES_SCHEMA: &str = "deltille/pictures/1";
 
-/// The result of an image.
+/// The result for an image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImageRecord {
     /// Its name, unique in a table, by which corners and images are joined.
@@ -66,7 +66,7 @@ pub struct ImageRecord {
 }
 
 impl ImageRecord {
-    /// The result of an image with a detection.
+    /// The result for an image with a detection.
     pub fn of(found: &Detection) -> Self {
         let mut found = found.clone();
         let tags = found.grids.iter().map(|grid| grid.tags.len()).sum::<usize>();
@@ -75,7 +75,7 @@ impl ImageRecord {
         Self { image: found.image.clone(), tags: tags as u32, found: Ok(found) }
     }
 
-    /// The result of an image that could not be read, with the reason.
+    /// The result for an image that could not be read, with the reason.
     pub fn unread(image: impl Into<String>, why: impl Into<String>) -> Self {
         Self { image: image.into(), tags: 0, found: Err(why.into()) }
     }

@@ -1,4 +1,4 @@
-//! Reader of tables written by this or other programs, some rows at a time.
+//! Reads tables written by this program or by others, one batch of rows at a time.
 
 use std::collections::{BTreeMap, HashMap};
 use std::str;
@@ -63,7 +63,7 @@ pub struct Read {
     pub short: usize,
 }
 
-/// The data of an image read so far.
+/// The data read so far for an image.
 struct Seen {
     image: String,
     picture: Option<ImageRecord>,

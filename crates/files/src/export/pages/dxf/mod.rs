@@ -3,8 +3,8 @@
 //! Closed paths are closed `POLYLINE`s, others are `LINE`s. Each of the layers `CUT`, `FOLD`, `VALLEY` and `ENGRAVE` has a colour,
 //! by which cutters choose the operation.
 //!
-//! The reader accepts only files in the form of the writer, and names any other element: it could move, hide or scale the cut
-//! lines.
+//! The reader accepts only files in the form of the writer. It reports any other element, because
+//! that element could move, hide or scale the cut lines.
 
 mod read;
 mod write;
