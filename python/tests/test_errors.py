@@ -31,7 +31,7 @@ def test_errors_are_python_exceptions_with_messages_of_the_library(tmp_path):
         (deltille.TargetError, ValueError, lambda: deltille.Icosahedron().files("obj", texture_px=1024), "textures"),
         (deltille.TargetError, ValueError, lambda: deltille.Board(4, 5).svg(3), "page 3"),
         (deltille.TargetError, ValueError, lambda: deltille.Board(4, 5).svg(-1), "page -1"),
-        (deltille.TargetError, ValueError, lambda: deltille.Board(-1, 5), "rows: expected a whole number from 0, got -1"),
+        (deltille.TargetError, ValueError, lambda: deltille.Board(-1, 5), "rows: expected a whole number of at least 0, got -1"),
         (deltille.TargetError, ValueError, lambda: deltille.Icosahedron(first_id=2**40), f"first_id: {2**40} is too"),
         (deltille.CameraError, ValueError, lambda: deltille.Camera(-4, 5, 1), "width: expected"),
         (deltille.CameraError, ValueError, lambda: deltille.Camera(640, 480, float("nan")), "focal_px"),

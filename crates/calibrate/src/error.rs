@@ -79,7 +79,7 @@ pub enum CalibrationError {
         all: usize,
     },
     /// Given intrinsics that contradict the images, which may be the reason for the failure.
-    #[error("the camera given for {cameras} did not take the images: {error}")]
+    #[error("the intrinsics given for {cameras} do not match the images: {error}")]
     WrongCameras {
         /// Names of the cameras.
         cameras: String,

@@ -144,7 +144,7 @@ pub fn whole<T: TryFrom<i64>>(
     class: fn(String) -> PyErr,
 ) -> PyResult<T> {
     let wrong = |_| match given {
-        ..0 => class(format!("{argument}: expected a whole number from 0, got {given}")),
+        ..0 => class(format!("{argument}: expected a whole number of at least 0, got {given}")),
         _ => class(format!("{argument}: {given} is too large")),
     };
     given.try_into().map_err(wrong)

@@ -71,7 +71,7 @@ fn faces_are_shared_among_textures() {
     let said = String::from_utf8(said.get_output().stderr.clone()).unwrap();
     assert!(
         said.contains("each-texture-4.png, ")
-            && said.contains("each.xml: these use other textures")
+            && said.contains("each.xml: these files use textures other")
     );
     let said = deltille(at, again).success();
     let said = String::from_utf8(said.get_output().stderr.clone()).unwrap();

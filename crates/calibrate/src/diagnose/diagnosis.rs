@@ -31,7 +31,7 @@ const NEARLY: f64 = 1.5;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Diagnosis {
-    /// A given camera did not take the images; the estimate is unusable.
+    /// The given intrinsics of a camera do not match the images; the estimate is unusable.
     WrongCamera {
         /// The camera.
         camera: usize,

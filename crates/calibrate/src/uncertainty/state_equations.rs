@@ -245,8 +245,8 @@ impl StateEquations {
         Some(Fit { beta, inverse, parts, whole, right, left, freedom })
     }
 
-    /// The values of the candidates in each view of a fit by [`Self::fit_with_each`], and the
-    /// reduction of its sum of squares.
+    /// For each view of a fit by [`Self::fit_with_each`], the values of the candidates and the
+    /// reduction of the view's sum of squares.
     pub(crate) fn each(
         &self,
         columns: &[Column],

@@ -60,7 +60,7 @@ enum Command {
     /// Make an AprilGrid (rows of tags) for Kalibr
     #[command(after_help = examples::APRILGRID)]
     Aprilgrid(Box<aprilgrid::Args>),
-    /// Make a grid of circles, plain or asymmetric, for OpenCV
+    /// Make a circle grid, symmetric or asymmetric, for OpenCV
     #[command(after_help = examples::CIRCLES)]
     Circles(Box<circles::Args>),
     /// Make a tetrahedron with tagged boards on its faces: a mesh, and files to print

@@ -13,8 +13,8 @@ const FOV_X_DEG: std::ops::RangeInclusive<u32> = 1..=350;
 /// Relative distance from the direction opposite to the axis below which points have no position on the plane.
 const BEHIND: f64 = 1e-6;
 
-/// Newton iterations of the inverse; from a start within half a knot spacing, six give full
-/// precision.
+/// Maximum number of Newton iterations of the inverse; from a start within half a knot spacing, six
+/// give full precision.
 const ITERATIONS: usize = 50;
 
 /// Number of halvings of a step that increases the residual.

@@ -62,7 +62,7 @@ impl Rules {
             let seen = bits - robust.to.count(dimension);
             if !(1..=seen).contains(&robust.distance) {
                 let problem = format!(
-                    "{robust}: the distance must be between 1 and the {seen} visible cells"
+                    "{robust}: the distance must be from 1 to {seen}, the number of visible cells"
                 );
                 return Err(FamilyError::field("robust", problem));
             }

@@ -31,8 +31,8 @@ pub fn parse_length_mm(text: &str) -> Result<f64, LengthError> {
     }
 }
 
-/// Parses the three sides of a box, for example `200x150x100mm`, `20 × 15 × 10 cm` or `200mm x 15cm x 0.1m`. A side
-/// without a unit has the unit of the last side.
+/// Parses the three edge lengths of a box, for example `200x150x100mm`, `20 × 15 × 10 cm` or
+/// `200mm x 15cm x 0.1m`. A length without a unit has the unit of the last one.
 ///
 /// ```
 /// let sides = deltille_core::targets::parse_box_mm("20x15x10 cm");
@@ -56,9 +56,9 @@ pub fn parse_box_mm(text: &str) -> Result<DVec3, BoxError> {
     }
 }
 
-/// A string that does not contain three sides.
+/// A string that does not consist of three positive lengths.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is not a box of three sides (example: 200x150x100mm)")]
+#[error("`{0}` does not consist of three positive lengths (example: 200x150x100mm)")]
 pub struct BoxError(pub String);
 
 /// Formats a length in millimetres as briefly as possible, with its unit: `20 mm`, `12.5 mm`.

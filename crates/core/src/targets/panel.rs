@@ -67,8 +67,8 @@ pub struct Panel {
         deserialize_with = "quantity::border_bits::de"
     )]
     pub tag_margin_bits: Option<f64>,
-    /// Width of every second row and column of a checkerboard's tiles, in edges, if these are gaps between tags: the
-    /// tiles whose lower left vertex has an odd row or an odd column.
+    /// Width of the gaps between the tags of an AprilGrid, in edges. Gaps are the tiles whose lower
+    /// left vertex has an odd row or an odd column.
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",

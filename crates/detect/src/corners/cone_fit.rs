@@ -108,8 +108,8 @@ fn products<const N: usize, T: Intensity>(
     sums.each_ref().map(lanes::sum)
 }
 
-/// Returns the sums of half of the lanes, starting at `first`, minus `level`. These fit into
-/// registers.
+/// Returns the sums of half of the lanes, starting at `first`; `level` is subtracted from each
+/// sample. Half of the lanes fit into registers.
 #[inline(always)]
 fn half_sums<const N: usize, T: Intensity>(
     kernels: &[[[f32; LANES]; N]],

@@ -30,8 +30,9 @@ const HARMONIC_NOISE: f32 = 0.408;
 /// Factor by which candidates must exceed the noise. At five, one pixel in a million passes.
 const NOISE_FACTOR: f32 = 5.0;
 
-/// Minimum area per corner, px². Tiles of 7 px are the smallest that can be distinguished from
-/// waves. Noise produces twice as many candidates.
+/// Minimum image area per corner, px²: that of tiles with edges of 7 px, the smallest that can be
+/// distinguished from waves of brightness. Noise alone produces twice as many candidates as this
+/// permits.
 const MIN_TILE_PX2: usize = 40;
 
 /// Maximum number of corners in an image: five times as many as are refined.

@@ -39,8 +39,8 @@ const RADII_PX: [f64; 4] = [6.0, 4.5, 8.0, 3.5];
 /// side.
 const DEAD_BAND: f64 = 0.12;
 
-/// Minimum deviation of every sector from the level, relative to the amplitude of the circle, if the roots of the form
-/// give the rays. It is half the deviation of an evenly divided circle under its own noise.
+/// Minimum mean deviation of every sector from the level, relative to the amplitude of the circle,
+/// if the rays are the roots of the form. It is half that of an evenly divided, noisy circle.
 const MIN_SECTOR: f64 = 0.3;
 
 /// Largest deviation of opposite rays from a straight line. Perspective keeps lines straight. Within a circle of 8 px,

@@ -124,7 +124,7 @@ impl Rectified {
         })
     }
 
-    /// Converts a displacement in the patch to the image, px.
+    /// Converts a displacement from the patch to the image, px.
     fn way_in_image(&self, way: DVec2) -> DVec2 {
         let seen = self.image_from_patch * Vector2::new(way.x, way.y);
         DVec2::new(seen.x, seen.y)

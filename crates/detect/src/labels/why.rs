@@ -33,8 +33,8 @@ const TAG_FOR_TAG: f64 = 2.0;
 
 /// One in this many pixels may be outside the range of the image: dead, hot, or a specular
 /// highlight. The smoothing of level 0 spreads each over nine pixels, so a dark image with one hot
-/// pixel in 9000 is still dark. From 250 to 4000 the reported blur changes by 4 %. At 100, a small
-/// bright board would be ignored as highlights.
+/// pixel in 9000 is still dark. Values from 250 to 4000 change the reported blur by 4 %. At 100, a
+/// small bright board would be ignored as highlights.
 const PIXELS_A_DEAD_ONE: usize = 1000;
 
 /// One in this many pixels may have a steeper gradient than the sharpest edges. In two megapixels,

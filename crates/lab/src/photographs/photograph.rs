@@ -19,8 +19,8 @@ use super::world::covers::Covers;
 use super::world::page::{PageCorner, PrintedPage};
 use deltille::raster::Gray;
 
-/// Minimum distance from the outline of a cover and from the image border at which a corner counts as visible or
-/// hidden, px of the sensor.
+/// Minimum distance from the outline of an occluding object and from the image border at which a
+/// corner counts as visible or hidden, sensor pixels.
 const CLEAR_PX: f64 = 3.0;
 
 /// Fraction of its contrast below which glare makes a corner invisible.

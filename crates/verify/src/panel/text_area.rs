@@ -7,7 +7,7 @@ use crate::document::page::Page;
 use deltille_layout::SheetText;
 use deltille_layout::artwork;
 
-/// White margin around a mark that belongs to it, px.
+/// White margin that counts as part of a mark, px.
 pub(crate) const BLANK_PX: f64 = 3.0;
 
 /// Returns the corners of the rectangle around a text, including the margin that belongs to it, px; `None` if it has

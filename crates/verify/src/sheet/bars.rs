@@ -45,10 +45,11 @@ pub(super) fn measure(page: &Page, ends_mm: [DVec2; 2]) -> Option<f64> {
 /// Returns the distance of the outer edge of the stroke beyond `end` in direction `outwards`, px; negative inwards.
 ///
 /// Ink is sampled at whole pixels along lines parallel to the bar. A stroke is dark on all of these lines and has the
-/// bar's line on its inner side only; the stroke nearest to the expected end counts. From the middle of a pixel that
-/// the stroke fills, the ink of the pixels beyond adds up to its edge, independent of resolution and pixel positions:
-/// edge = position + ½ + Σ ink. (The centre of gravity would be wrong: a pixel's ink counts in the middle of the
-/// pixel, up to ⅛ px² too far out.)
+/// bar's line on its inner side only; the stroke nearest to the expected end counts. From a pixel
+/// that the stroke fills completely, the ink of the pixels beyond gives the position of its edge,
+/// independent of resolution and pixel positions: edge = position + ½ + Σ ink. (The centre of
+/// gravity would be biased: it places the ink of a partly covered pixel at the middle of the pixel,
+/// so the moment is up to ⅛ px² too large.)
 fn outer_edge(
     page: &Page,
     end: DVec2,

@@ -91,7 +91,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let what = match hidden {
             HiddenCells::Apex => format!("the {cells} cells of a corner"),
             HiddenCells::Edge => format!("the {cells} cells along an edge"),
-            _ => format!("any {cells} cells in a triangle"),
+            _ => format!("any triangle of {cells} cells"),
         };
         let kept = rules.robust.iter().find(|rule| rule.to == hidden);
         let kept = kept.map_or(String::new(), |rule| format!(", required {}", rule.distance));

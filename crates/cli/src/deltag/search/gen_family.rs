@@ -33,9 +33,10 @@ use deltille_core::words::counted;
 
 /// Text at the end of `--help`.
 pub const HELP: &str = "Ctrl-C ends a search early. The methods best and algebraic then write the best family so far \
-    (exit code 0). The method search writes the result of its finished rounds, and lexicode writes nothing (exit code \
-    130). With --resume, running the same command again continues the search and gives the same result as an \
-    uninterrupted run; with --time, it uses the remaining time. If nothing has been found yet, nothing is written \
+    (exit code 0). --method search writes the result of its finished rounds, and lexicode writes \
+    nothing (exit code 130). With --resume, running the same command again continues the search \
+    and gives the same result as an uninterrupted run; \
+    with --time, it uses the remaining time. If nothing has been found yet, nothing is written \
     (130). A second Ctrl-C ends the program immediately.";
 
 /// Help text of `--force`.
@@ -69,7 +70,7 @@ pub struct Args {
     /// Seed of the random number generator of best, algebraic and search [default: 1]
     #[arg(long, allow_negative_numbers = true, value_parser = whole(0..=u64::MAX))]
     seed: Option<u64>,
-    /// Maximum number of rounds of the method search [default: 3, or unlimited with --time]
+    /// Maximum number of rounds with --method search [default: 3, or unlimited with --time]
     #[arg(long, allow_negative_numbers = true, value_parser = whole(1..=1_000_000u32))]
     rounds: Option<u32>,
     /// Maximum number of codes, for best and algebraic [default: as many as fit in a file of 64

@@ -24,7 +24,7 @@ impl FromStr for Parameters {
         }
         let dimension = Dimension::from_bits(bits).map_err(|e| e.to_string())?;
         if !(1..=bits).contains(&distance) {
-            return Err(format!("the distance must be between 1 and the {bits} bits"));
+            return Err(format!("the distance must be from 1 to {bits}, the number of bits"));
         }
         Ok(Self { dimension, distance })
     }

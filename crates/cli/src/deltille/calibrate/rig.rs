@@ -53,7 +53,7 @@ pub struct Args {
     /// Camera with known, fixed intrinsics, and its file
     #[arg(long, value_name = "NAME=FILE", value_parser = named)]
     known: Vec<(String, PathBuf)>,
-    /// Use --target even if the detections or the camera name another target
+    /// Use --target even if the detections or the camera files refer to another target
     #[arg(long)]
     assume_target: bool,
     #[command(flatten)]

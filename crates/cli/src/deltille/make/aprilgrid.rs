@@ -32,7 +32,8 @@ pub struct Args {
     #[arg(long, help_heading = TAGS, value_name = "ID", default_value_t = 0,
           allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     first_id: u32,
-    /// Width of a tag's black border in cells, 1 to 10; Kalibr supports only 2, most others 1
+    /// Width of a tag's black border in cells, 1 to 10; Kalibr supports only 2, most other
+    /// detectors only 1
     #[arg(long, help_heading = TAGS, value_name = "BITS", default_value_t = 2.0,
           value_parser = number(1.0..=10.0))]
     tag_border: f64,

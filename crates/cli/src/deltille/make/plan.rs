@@ -178,7 +178,7 @@ fn print(situation: &Situation, proposal: &Proposal, command: &str) -> anyhow::R
     );
     say!("{command}");
     let whole = match proposal.reach.tags {
-        0 => "; closer, it is not labelled",
+        0 => "; closer, the board is not labelled",
         _ if is_dense(proposal) => "; closer, any 3 × 4 visible tiles are labelled",
         _ => "; closer, visible parts with a tag are labelled",
     };
@@ -202,7 +202,7 @@ fn print(situation: &Situation, proposal: &Proposal, command: &str) -> anyhow::R
     say!("{}", reach("labelled", &|tilt| Some(proposal.reach.labelled_to_mm(focal_px, tilt))));
     if is_dense(proposal) {
         let patches = |tilt| proposal.patches_to_mm(focal_px, tilt);
-        say!("{}", reach("3 × 4 tiles of it", &patches));
+        say!("{}", reach("patches of 3 × 4 tiles", &patches));
     }
     Ok(())
 }

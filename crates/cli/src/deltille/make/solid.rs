@@ -50,8 +50,7 @@ pub const MEAN_OF_MESH: &str =
 
 /// Help of options with a different meaning for solids with square tags.
 pub mod squares {
-    pub const MEAN: &str =
-        "Mean of the three sides to which the cuboid is scaled [default: unscaled]";
+    pub const MEAN: &str = "Mean edge length to which the cuboid is scaled [default: unscaled]";
     pub const TILES: &str = "Number of squares along each side of a face, 6 to 200; on a cuboid, along the shortest side \
                              (squares have the same size on all faces) [default: 8]";
     pub const FAMILY: &str = "Tag family: aprilTag36h11, aprilTag25h9 or aprilTag16h5, or a family file \
@@ -64,7 +63,7 @@ pub mod squares {
 /// Arguments of `deltille cuboid`.
 #[derive(clap::Args)]
 pub struct CuboidArgs {
-    /// Sides along x, y and z, such as 200x150x100mm or 8x6x4in
+    /// Edge lengths along x, y and z, such as 200x150x100mm or 8x6x4in
     #[arg(long, value_name = "SIZE")]
     size: Option<String>,
     #[command(flatten)]

@@ -65,7 +65,8 @@ struct GuideArgs {
     /// Standard deviation of the corner noise per axis, px
     #[arg(long, value_name = "PX", default_value = "0.1", value_parser = noise_px)]
     noise: f64,
-    /// Render every image and detect its corners instead, with pixel noise only
+    /// Render every image with pixel noise and detect its corners, instead of adding --noise to
+    /// projected corners
     #[arg(long, conflicts_with = "noise")]
     pictures: bool,
     /// Cameras to simulate [default: all]
@@ -94,7 +95,7 @@ struct RigArgs {
     #[arg(long, value_name = "PX", default_value_t = 1600,
           value_parser = whole(800..=8000u32))]
     width: u32,
-    /// Number of times at which images are taken; the paper uses 150
+    /// Number of frames (simultaneous images of all cameras); the paper uses 150
     #[arg(long, value_name = "N", default_value_t = 30,
           value_parser = whole(5..=1000u32))]
     frames: u32,
@@ -104,7 +105,7 @@ struct RigArgs {
 
 #[derive(clap::Args)]
 struct StatesArgs {
-    /// Number of runs without a fault
+    /// Number of runs of the scene without a fault
     #[arg(long, value_name = "N", default_value_t = 500, value_parser = whole(1..=100_000u32))]
     clean: u32,
     /// Number of runs per scene with a fault
@@ -120,7 +121,7 @@ struct StatesArgs {
 
 #[derive(clap::Args)]
 struct CornersArgs {
-    /// Number of simulated images per point; each is refined from four starting points
+    /// Number of simulated images per plotted point; each is refined from four initial positions
     #[arg(long, value_name = "N", default_value_t = 1000,
           value_parser = whole(1..=1_000_000u32))]
     images: u32,
@@ -142,7 +143,7 @@ struct PhotographsArgs {
           value_parser = ["deltille", "deltille-untagged", "checker", "checker-untagged", "all"])]
     kind: Vec<String>,
     /// Simulate photographs of the first page of this target instead: the .json of `deltille board`
-    /// …
+    /// or of another command that makes targets
     #[arg(long, value_name = "FILE", conflicts_with = "kind")]
     target: Option<PathBuf>,
     /// Family file, if the target uses a family that does not ship with the program

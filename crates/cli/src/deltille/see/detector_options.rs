@@ -33,7 +33,8 @@ pub struct FinderArgs {
     /// Family file, if the target uses a family that does not ship with the program
     #[arg(long, conflicts_with = "grid")]
     family: Option<String>,
-    /// Maximum number of corrected bits per tag [default: ⌊(h−1)/2⌋ of its family]
+    /// Maximum number of corrected bits per tag [default: ⌊(h−1)/2⌋, with h the distance of the
+    /// family]
     #[arg(long, value_name = "BITS", conflicts_with = "grid", value_parser = whole(0..=u32::MAX))]
     max_errors: Option<u32>,
     /// Also label mirror images of boards

@@ -181,7 +181,7 @@ pub(in crate::family) fn check_form(
     let bits = dimension.bits();
     Name::without_dots(name).map_err(|problem| FamilyError::field("name", problem))?;
     if !(1..=bits).contains(&distance) {
-        let problem = format!("{distance} is not between 1 and the {bits} bits of a tag");
+        let problem = format!("{distance} is not between 1 and {bits}, the number of bits");
         return Err(FamilyError::field("distance", problem));
     }
     check_name(name, dimension, distance)?;

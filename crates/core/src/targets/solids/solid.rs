@@ -106,8 +106,8 @@ impl SolidSpec {
     /// Returns the distance of the edges of panels from those of their faces, mm: 0 without a skeleton.
     ///
     /// # Errors
-    /// Returns an error if it exceeds the white of the margin, so that tiles, or the black around white ones, would
-    /// lie on the ribs.
+    /// Returns an error if it exceeds the white margin: the tiles, or the black field of an
+    /// inverted board, would lie on the ribs.
     pub fn panel_inset_mm(&self) -> Result<f64, TargetError> {
         let Some(skeleton) = &self.skeleton else { return Ok(0.0) };
         let inset_mm = Skeleton::new(&self.polyhedron(), skeleton)?.panel_inset_mm;

@@ -62,8 +62,8 @@ pub fn png(image: &AnyGray, detection: &Detection) -> Result<Vec<u8>, OverlayErr
     Ok(signed_png(png))
 }
 
-/// Returns the PNG file of an image of a given size, px, with outlines and points in lines of a given width, px. The background
-/// is black without a photograph.
+/// Returns a PNG file with outlines and dots drawn over a photograph, or over a black image of the
+/// given size, px, if there is none.
 pub(in crate::export) fn outlined(
     image: Option<&AnyGray>,
     [width, height]: [u32; 2],

@@ -187,8 +187,8 @@ impl Kind {
         let marked = text.lines().take(HEAD_LINES).find_map(marked);
         let words = plain(first);
         Self::words(match marked.filter(|marked| *marked != words) {
-            Some(marked) => format!("a text that begins `{words}`, by {marked}"),
-            None => format!("a text that begins `{words}`"),
+            Some(marked) => format!("text that begins with `{words}`, by {marked}"),
+            None => format!("text that begins with `{words}`"),
         })
     }
 }

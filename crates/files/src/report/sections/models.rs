@@ -3,7 +3,7 @@
 use crate::report::html::{escaped, meter};
 use deltille_calibrate::{CameraEstimate, Candidate, Comparison, Region};
 
-/// Difference between the camera of a model and the camera of the page.
+/// Difference between the camera calibrated with a candidate model and the reported camera.
 struct Against {
     rms_px: f64,
     largest_px: f64,
