@@ -81,7 +81,7 @@ impl Calibration {
         Err(CalibrationError::WrongDetection { view: view.name.clone(), problem })
     }
 
-    /// Rejects views if too few of them agree.
+    /// Rejects the calibration if too few of its views or frames agree.
     fn check_frames(&self, gross: &Gross) -> Result<(), CalibrationError> {
         let (wrong, all) = (gross.frames.len(), gross.problem.frames.len());
         match self.cameras.as_slice() {
@@ -148,7 +148,8 @@ fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
     }
 }
 
-/// The estimate of a calibration of one camera, in the form that the start of a rig needs.
+/// Calibrates a single camera; returns its estimate in the form needed for the initial values of
+/// a rig.
 fn by_itself(calibration: &Calibration) -> Result<Alone, CalibrationError> {
     let Estimate { cameras, excluded, .. } = calibration.adjusted()?;
     let only = cameras.into_iter().next().ok_or(CalibrationError::NoStart)?;

@@ -13,8 +13,9 @@ const MAX_WORDS: usize = 30_000;
 /// Number of moves of the local search.
 const STEPS: u64 = 4_000_000;
 
-/// Returns a construction that lists more of its words, and its codes. A construction alone takes
-/// words in order, which is rarely the best selection.
+/// Adds a list of selected words to a construction if that gives more codes; returns the codes and
+/// the construction. Without such a list, a construction takes words in order, which is rarely the
+/// best selection.
 pub(crate) fn with_the_most_codes(
     screen: &Screen,
     construction: AlgebraicConstruction,

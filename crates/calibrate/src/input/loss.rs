@@ -17,7 +17,7 @@ pub enum Loss {
     /// The influence of a residual stays constant beyond 3σ.
     #[default]
     Huber,
-    /// Residuals beyond 3σ have almost no influence.
+    /// The influence of a residual is largest at 3σ and decreases beyond it.
     Cauchy,
 }
 

@@ -138,7 +138,8 @@ impl fmt::Display for Reason {
             ReasonKind::OtherTiling => {
                 write!(
                     f,
-                    "{} belong to the other tiling (triangles or squares)",
+                    "found {} of the other tiling: check whether the target has triangles or \
+                     squares",
                     count("corners", "corner")
                 )
             }

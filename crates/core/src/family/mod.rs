@@ -156,9 +156,8 @@ impl Family {
         })
     }
 
-    /// Returns the family with the family of the squares added, for a target with faces of both
-    /// tilings. A family file
-    /// contains only one of them.
+    /// Returns the family with the family of the square tags added, for a target with faces of both
+    /// tilings. A family file contains only one of them.
     pub fn with_squares(self, squares: Family) -> Self {
         Self { squares: Some(Box::new(squares)), ..self }
     }

@@ -55,8 +55,8 @@ const SATURATED: f64 = 0.985;
 /// Shares of white from which the sensor may saturate: white is overexposed up to eightfold.
 const CLIPPED_SHARES: [f64; 8] = [1.0, 0.85, 0.65, 0.5, 0.35, 0.25, 0.18, 0.12];
 
-/// Factor by which stronger clipping must reduce the sum of squares to be accepted. Sharp edges of a rendered page,
-/// where all white is full scale, fit any share.
+/// Factor by which stronger clipping must reduce the sum of squares to be accepted. For the
+/// sharp edges of a rendered page, whose white is at full scale, every share fits equally well.
 const CLIPPING_GAIN: f64 = 1.5;
 
 /// Minimum standard deviation of a sample, as a fraction of full scale: half a step of 8 bits.

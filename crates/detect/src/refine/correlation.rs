@@ -21,7 +21,7 @@ use multiversion::multiversion;
 use crate::lanes;
 use crate::lanes::LANES;
 
-/// Residuals of a corner, and the response of its parameters to its pixels.
+/// Residuals of a corner, and the influence of its pixels on its position.
 #[derive(Clone, Debug)]
 pub(crate) struct Influence {
     /// Pixels, relative to any origin.

@@ -54,7 +54,7 @@ pub const MAX_WINDOW_PX: usize = 2 * MAX_RADIUS + 1;
 pub enum Refinement {
     /// The umbilic point of a fitted cubic surface, as in the paper, or the saddle point of a quadric.
     Polynomial,
-    /// A blurred corner fitted to the pixels, from the result of the polynomial.
+    /// A blurred corner model fitted to the pixels, starting from the polynomial's result.
     #[default]
     Model,
 }

@@ -44,10 +44,9 @@ impl LogoSize {
         self.width
     }
 
-    /// Returns the width and height of the logo in a strip of the given `length`, beside `words` of
-    /// the given length. A
-    /// requested height is used up to `most`. Otherwise the logo is as high as the strip is `deep`, or smaller to leave
-    /// room for the words.
+    /// Returns the width and height of the logo in a strip of the given `length`, beside text of
+    /// the length `words`. A requested height is limited to `most`. Otherwise the logo has the
+    /// height `deep` of the strip, or less to leave room for the text.
     pub(crate) fn in_strip(self, [length, words]: [f64; 2], deep: f64, most: f64) -> DVec2 {
         let widest = MAX_PART * length;
         let height = match self.height_mm {

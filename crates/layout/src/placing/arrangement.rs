@@ -44,8 +44,8 @@ const CROP_WIDTH_MM: f64 = 0.15;
 /// Smallest blank strip along the edges of the paper, mm, even with a smaller margin. A pixel at 200 dpi is 0.13 mm,
 /// and the stroke of a bar that touches the edge can be neither measured nor trimmed.
 pub(crate) const MIN_MARGIN_MM: f64 = 0.5;
-/// Smallest edge length proposed to make a board fit, mm: the smallest that office printers resolve
-/// in a tag.
+/// Smallest edge length proposed to make a board fit, mm. Below it, office printers do not resolve
+/// the cells of a tag.
 const MIN_PROPOSED_MM: u32 = 5;
 
 /// Bounding rectangle of a panel's ink, and the blank space it needs, mm.

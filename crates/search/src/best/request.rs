@@ -1,4 +1,5 @@
-//! The request of a search, the start on record, and the upper bound.
+//! The request of a search, the shipped family that it starts from, and the upper bound on the
+//! number of codes.
 
 use std::time::Duration;
 

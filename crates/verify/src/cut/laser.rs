@@ -1,7 +1,8 @@
 //! Verification of drawings of boards and faces for a laser or a plotter, as `.dxf` or `.svg`.
 //!
-//! The kerf is measured: it follows from the difference between the length of the first plate's outline and the edge
-//! of that plate. With that kerf, every outline must then be at its position in the target.
+//! The kerf is measured: it follows from the difference between the perimeters of the first cut
+//! outline and of the finished plate. With that kerf, every outline must then be at
+//! its position in the target.
 //! Independently of that, the half kerf that the beam removes is added back to the engraved areas,
 //! and the detector examines the resulting board like a printed page. resvg also renders an SVG,
 //! which must show nothing but the parsed outlines.

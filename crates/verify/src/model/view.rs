@@ -79,8 +79,8 @@ impl View {
         })
     }
 
-    /// Returns the first point of a front side of the mesh on the ray of a pixel, in the target frame, mm; `None` if
-    /// the ray hits nothing.
+    /// Returns the first intersection of a pixel's ray with a front-facing triangle of the mesh, in
+    /// the target frame, mm; `None` if the ray hits nothing.
     pub(crate) fn meet(&self, model: &Model, pixel: DVec2) -> Option<DVec3> {
         let target_from_camera = self.camera_from_target.inverse();
         let eye = target_from_camera.translation;

@@ -1,6 +1,6 @@
 //! One panel on a page.
 //!
-//! Input: a page, and a panel at its stated position. Output: its tiles and tags, right or wrong.
+//! Input: a page, and a panel at its stated position. Output: its tiles and tags, correct or not.
 //!
 //! 1. `placed` relates panel, page and image coordinates, by an `affine_map` if the board is found elsewhere;
 //!    `text_area` is the area of texts in the tiles.

@@ -54,7 +54,7 @@ pub fn about(of: &Family, other: &Family, result_format: ResultFormat) -> anyhow
         say!("  {corrected:<32}  {direct:>10}  {mirrored:>12}");
     }
     say!(
-        "  {} corrects {t} cells, {} {u}: pairs within this distance can be confused",
+        "  {} corrects {t} cells and {} corrects {u}: tags that differ in no more can be confused",
         of.name(),
         other.name()
     );

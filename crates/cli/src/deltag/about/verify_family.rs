@@ -98,8 +98,10 @@ pub fn proof_of(certificate: &Certificate, claimed: u32) -> String {
         true => format!("{known}, more than the required {claimed}"),
         false => known,
     };
-    let hidden =
-        |found: &Robust| format!("; with any {} hidden, in {}", found.to.name(), found.distance);
+    let hidden = |found: &Robust| {
+        let least = counted(found.distance as usize, "cell");
+        format!("; with any {} hidden, in at least {least}", found.to.name())
+    };
     let known: String =
         std::iter::once(known).chain(certificate.robust.iter().map(hidden)).collect();
     match certificate.mirror_distance {

@@ -46,9 +46,9 @@ pub struct Args {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Shape {
-    /// DelTags, with 120° rotational ambiguity
+    /// DelTags; distances include rotations by 120°
     Triangle,
-    /// AprilTags and ArUco markers, with 90° rotational ambiguity
+    /// AprilTags and ArUco markers; distances include rotations by 90°
     Square,
 }
 

@@ -28,9 +28,9 @@ pub struct Args {
 /// Selection of the best rule.
 #[derive(clap::Args)]
 pub struct ChoiceArgs {
-    /// Select the complexity rule that keeps the most codes without exceeding this false-positive
-    /// rate per black-bordered triangle in natural images, such as 1e-4, with --corrects cells
-    /// corrected
+    /// Select the complexity rule that keeps the most codes with at most this false-positive rate,
+    /// such as 1e-4. The rate is per black-bordered triangle in natural images, with the error
+    /// correction of --corrects
     #[arg(long, value_name = "RATE", allow_negative_numbers = true,
           value_parser = crate::values::number(1e-15..=1.0))]
     pub false_positives: Option<f64>,

@@ -22,7 +22,7 @@ pub struct Args {
     #[arg(long, default_value_t = 10, allow_negative_numbers = true,
           value_parser = whole(1..=u32::MAX))]
     tags_per_face: u32,
-    /// Minimum number of misread cells that must be correctable per tag
+    /// Number of misread cells per tag that the family must be able to correct
     #[arg(long, value_name = "CELLS", default_value_t = 0, allow_negative_numbers = true,
           value_parser = whole(0..=31u32))]
     corrects: u32,

@@ -36,9 +36,9 @@ use deltille_core::words::counted;
 /// Arguments of `deltille rig`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Camera and the folder of its detections, such as left=corners/left; once per camera, and the
-    /// first defines the rig's frame. Images taken at the same time must have the same file name in
-    /// each folder
+    /// Camera and the folder of its detections, such as left=corners/left; repeat for each camera.
+    /// The first camera defines the rig's frame. Images taken at the same time must have the same
+    /// file name in each folder
     #[arg(long, required = true, value_name = "NAME=FOLDER", value_parser = named)]
     camera: Vec<(String, PathBuf)>,
     /// Target description: the .json written with the target; repeatable for several targets that do not move

@@ -452,7 +452,7 @@ fn of_tables(files: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<(String, 
     if found.len() < all {
         let unread = counted(all - found.len(), "image");
         let folder = files[0].parent().unwrap_or(&files[0]);
-        log!("excluded: {unread} of the tables in {} that could not be read", folder.display());
+        log!("excluded: {unread} marked as unreadable in the tables in {}", folder.display());
     }
     let stem = |image: &str| {
         let stem = Path::new(image).file_stem();

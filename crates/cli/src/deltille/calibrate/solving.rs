@@ -30,8 +30,8 @@ use deltille_core::words::counted;
 /// Options of the solver and the report.
 #[derive(clap::Args)]
 pub struct SolveArgs {
-    /// Hold out every N-th view (N, 2N, …), or every N-th frame of a rig, and report its
-    /// reprojection error, with only its poses estimated
+    /// Hold out every N-th view (N, 2N, …), or every N-th frame of a rig, estimate only its pose,
+    /// and report its reprojection error
     #[arg(long, value_name = "N", value_parser = whole(2..=u32::MAX))]
     holdout: Option<u32>,
     /// Robust loss for outliers
@@ -70,7 +70,7 @@ enum Robust {
     None,
     /// Residuals beyond 3σ have constant influence
     Huber,
-    /// Residuals beyond 3σ have almost no influence
+    /// The influence of a residual is largest at 3σ and decreases beyond it
     Cauchy,
 }
 
@@ -176,7 +176,7 @@ pub struct Calibrated {
 }
 
 impl SolveArgs {
-    /// Returns placeholders of the files of [`Calibrated::measured`].
+    /// Returns placeholders for the files of [`Calibrated::measured`].
     pub fn planned(&self, stem: &str) -> Vec<File> {
         let file = |end: &str, text: String| text_file(format!("{stem}-measured.{end}"), text);
         let empty = || target_map_svg(&TargetMap::new(Vec::new(), [0.0; 2]));

@@ -40,8 +40,8 @@ enum Experiment {
     /// Detection on simulated photographs of a printed page with known ground truth, degraded in one way at a time:
     /// photographs.csv, .json, .svg and .png
     Photographs(PhotographsArgs),
-    /// The paper's §4.4: a rig of four cameras, calibrated with an icosahedron and with a cube with misplaced panels,
-    /// with and without refining them: rig.csv
+    /// The paper's §4.4: a rig of four cameras, calibrated with an icosahedron and with a cube. The
+    /// panels of both are misplaced; their poses are nominal or estimated: rig.csv
     Rig(RigArgs),
     /// Detection and false-alarm rates of camera changes: unchanged camera, changed camera, rolling shutter, wrong
     /// aspect ratio of the board: states.csv

@@ -48,8 +48,9 @@ pub struct Args {
     #[arg(long)]
     timing: bool,
     /// Print each result as a line of JSON on standard output as soon as it is available; files are written only if
-    /// -o is given. The ink spread is then estimated from each image separately, so corners differ
-    /// slightly from those of a run without --stream, unless --ink is a value in µm or none
+    /// -o is given. With --stream, the ink spread is estimated from each image separately, so
+    /// corners differ slightly from those of a run without it, unless --ink is a value in µm or
+    /// none
     #[arg(long)]
     stream: bool,
     /// Accept incomplete JPEG files and note the damage in the result; otherwise they are errors

@@ -39,8 +39,9 @@ pub struct AlgebraicConstruction {
     /// Number of listed codes, the first in order; absent if all are listed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limit: Option<u64>,
-    /// Step between the numbers of listed tags of a linear code, modulo the number of tags, with which it has no
-    /// common divisor. A `limit` is then required. For each code that the limit allows, at most 64 numbers are tried.
+    /// Step between the numbers of listed tags of a linear code, modulo the number of tags; the two
+    /// are coprime. A `limit` is then required. For each code that the limit allows, at most 64
+    /// numbers are tried.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stride: Option<u64>,
     /// Seed of the search that found the construction.
@@ -110,8 +111,7 @@ impl AlgebraicConstruction {
         }
         let count = ranked.len();
         if count == 0 || greatest_common_divisor(stride, count) != 1 {
-            let problem =
-                format!("{stride} and the number of tags, {count}, have a common divisor");
+            let problem = format!("{stride} and the number of tags, {count}, are not coprime");
             return Err(wrong("stride", &problem));
         }
         let limit = self.limit.filter(|&limit| limit <= MAX_CODES);

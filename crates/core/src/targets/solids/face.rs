@@ -253,9 +253,9 @@ impl Flat {
         })
     }
 
-    /// Positions the deltille lattice so that the number of corners is largest. The lattice starts
-    /// at the lower left end of the margin, which suits angles of 60° and 120°. Otherwise it is
-    /// centred on a vertex, an edge or a tile.
+    /// Positions the deltille lattice so that the number of corners is largest. Candidates for its
+    /// origin are the first corner of the area inside the margin, which suits angles of 60° and
+    /// 120°, and three positions that centre a vertex, an edge or a tile on the face.
     fn filled(self, tiles: u32, margin_mm: f64) -> Option<Face> {
         let corners: Vec<DVec3> = self.outline.iter().map(|p| p.extend(0.0)).collect();
         let circle = Incircle::of(&corners);

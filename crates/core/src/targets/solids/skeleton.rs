@@ -217,8 +217,9 @@ fn inward_directions(corners: &[DVec3], normal: DVec3) -> Vec<DVec3> {
         .collect()
 }
 
-/// Returns the vertices of the inner side: `below` the planes of all faces around a vertex. This is exact where three
-/// faces meet or the faces are evenly arranged, and a least-squares fit elsewhere.
+/// Returns the vertices of the inner side: each at the distance `below` from the planes of all
+/// faces around the vertex, inwards. This is exact where three faces meet or the faces are evenly
+/// arranged, and a least-squares fit elsewhere.
 fn inner_vertices(solid: &Polyhedron, below: f64) -> Vec<DVec3> {
     let mut normals = vec![Vec::new(); solid.vertices_mm.len()];
     for (index, face) in solid.faces.iter().enumerate() {

@@ -83,7 +83,7 @@ pub(crate) struct TagLabeller {
     pub(super) sure_errors: u32,
     /// Number of words of the family.
     pub(super) family_words: usize,
-    /// Maximum number of misread cells of a tag that counts, if limited.
+    /// Maximum number of misread cells of an accepted tag, if limited.
     pub(super) max_errors: Option<u32>,
     /// Words of the target.
     pub(super) words: TargetWords,
