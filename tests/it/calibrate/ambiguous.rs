@@ -169,6 +169,19 @@ fn labels_that_change_between_frames_are_unified() {
     }
 }
 
+/// In few frames, a lag follows from the rotations between frames, which labels of other frames seem to change.
+#[test]
+fn labels_that_change_between_few_frames_are_no_lag() {
+    for seed in 0..12 {
+        let mut random = ChaCha8Rng::seed_from_u64(200 + seed);
+        let boards = moved(6, 0.6, PI, &mut random);
+        let rig = Rig::of(&checkerboard(4, 6), &[0.0, 2.0], &boards, Model::Radtan, seed);
+        let lags: Vec<i32> = rig.found.cameras.iter().map(|camera| camera.delay).collect();
+        assert_eq!(lags, [0, 0], "seed {seed}");
+        assert!(rig.off_mm() < 8.0, "seed {seed}: {} mm", rig.off_mm());
+    }
+}
+
 #[test]
 fn consistent_labels_are_not_rotated() {
     for (rows, cols, rolls) in [(4, 6, [0.0, 0.2]), (4, 7, [0.0, PI]), (5, 7, [0.1, -0.1])] {

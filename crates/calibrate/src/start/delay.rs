@@ -80,7 +80,7 @@ fn delay_between(from: &Track, to: &Track, symmetries: &Symmetries) -> Option<(i
     };
     let mut all = scatters(&|delay| scatter_of_poses(from, to, delay, symmetries));
     if all.is_empty() {
-        all = scatters(&|delay| scatter_of_rotations(from, to, delay));
+        all = scatters(&|delay| scatter_of_rotations(from, to, delay, symmetries));
     }
     let &(delay, (least, moments)) = all.iter().min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
     let in_time = all.iter().find(|(delay, _)| *delay == 0);
@@ -128,26 +128,34 @@ fn scatter_of_poses(
 }
 
 /// Difference of the rotations between frames as seen by the two cameras, rad.
-fn scatter_of_rotations(from: &Track, to: &Track, delay: i32) -> Option<(f64, usize)> {
+fn scatter_of_rotations(
+    from: &Track,
+    to: &Track,
+    delay: i32,
+    symmetries: &Symmetries,
+) -> Option<(f64, usize)> {
     let both: Vec<(usize, usize)> = moments(from, to, delay).collect();
     let mut off = Vec::new();
     for (index, &(first, second)) in both.iter().enumerate() {
         let later = both[index + 1..].iter().take_while(|(a, _)| *a <= first + LONGEST_SPAN);
         for &(first_later, second_later) in later {
-            let a = rotation_rad(from[first], from[first_later]);
-            let b = rotation_rad(to[second], to[second_later]);
-            off.extend(a.zip(b).map(|(a, b)| (a - b).abs()));
+            let a = rotations_rad(from[first], from[first_later], symmetries);
+            let b = rotations_rad(to[second], to[second_later], symmetries);
+            let all = a.iter().flat_map(|a| b.iter().map(move |b| (a - b).abs()));
+            off.extend(all.min_by(f64::total_cmp));
         }
     }
     let count = off.len();
     (count >= MIN_MOMENTS).then(|| median(off)).flatten().map(|scatter| (scatter, count))
 }
 
-/// Rotation of a target between two frames; `None` if no target is seen in both.
-fn rotation_rad(before: &[Seen], after: &[Seen]) -> Option<f64> {
+/// Rotation of a target between two frames: with the detected labels, then with those of the second frame rotated.
+/// Empty if no target is seen in both.
+fn rotations_rad(before: &[Seen], after: &[Seen], symmetries: &Symmetries) -> Vec<f64> {
     let mut pairs = before.iter().flat_map(|a| after.iter().map(move |b| (a, b)));
-    let (a, b) = pairs.find(|(a, b)| a.target == b.target)?;
-    Some(a.camera_from_target.rotation.angle_between(b.camera_from_target.rotation))
+    let Some((a, b)) = pairs.find(|(a, b)| a.target == b.target) else { return Vec::new() };
+    let rotation = a.camera_from_target.rotation;
+    symmetries.poses(b).map(|pose| rotation.angle_between(pose.rotation)).collect()
 }
 
 /// Moves the observations of lagging cameras to the frames that they show.

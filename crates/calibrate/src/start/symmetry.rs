@@ -94,7 +94,7 @@ impl Symmetries {
     }
 
     /// The poses of a view of a target: with the detected labels, then with rotated labels.
-    fn poses(&self, seen: &Seen) -> impl Iterator<Item = Pose> {
+    pub(super) fn poses(&self, seen: &Seen) -> impl Iterator<Item = Pose> {
         let rotated = self.of_target[seen.target].iter();
         let rotated = rotated.map(|of| seen.camera_from_target.after(&of.labelled_from_rotated));
         std::iter::once(seen.camera_from_target).chain(rotated)
