@@ -74,7 +74,7 @@ impl fmt::Display for Reason {
             Self::Off { off_px, usual_px } => write!(
                 f,
                 "its corners are off by {off_px:.1} px, those of other views by only {usual_px:.2} px: \
-                 wrong labels, or another target"
+                 wrong labels, another target, or a lens that the model does not fit there"
             ),
             Self::AnotherMoment { camera, off_px } => write!(
                 f,
@@ -84,7 +84,7 @@ impl fmt::Display for Reason {
             Self::Stranger { is_rig: false, deviations } => write!(
                 f,
                 "this view implies a different camera: it would shift the intrinsics by {deviations:.1}σ \
-                 (zoom, focus or crop changed, or the board bent)"
+                 (zoom, focus or crop changed, the board bent, or the model does not fit the lens there)"
             ),
             Self::Stranger { is_rig: true, deviations } => write!(
                 f,
@@ -108,6 +108,19 @@ impl Serialize for Reason {
 }
 
 impl Excluded {
+    /// Whether the lens may depart from its model where the corners lie, so that the view itself is right.
+    pub(crate) fn may_be_of_lens(&self) -> bool {
+        let is_of_lens = match self.reason {
+            Reason::NoPose | Reason::Off { .. } | Reason::Stranger { .. } => true,
+            Reason::Foreign(_)
+            | Reason::Copy { .. }
+            | Reason::AnotherMoment { .. }
+            | Reason::Mirrored
+            | Reason::OnlyWrongPanels => false,
+        };
+        self.panel.is_none() && is_of_lens
+    }
+
     /// The name of the view, followed in a rig by that of the camera.
     pub fn shown(&self) -> String {
         match &self.camera {

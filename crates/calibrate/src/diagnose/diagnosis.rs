@@ -8,6 +8,7 @@ use crate::adjust::finding::{Finding, OutlierPattern};
 use crate::adjust::lack_of_fit::LackOfFit;
 use crate::estimate::lens_limit::LensLimit;
 use crate::estimate::values::{CameraEstimate, Estimate};
+use crate::excluded::Excluded;
 use crate::input::calibration::Calibration;
 use crate::input::order::in_order;
 use crate::input::panel::PanelRef;
@@ -276,7 +277,12 @@ impl Calibration {
     fn each_alone(&self, found: &Estimate) -> Vec<Alone> {
         let is_good = is_explained(found);
         let alone = found.cameras.iter().enumerate().map(|(index, camera)| {
-            let has_question = !is_good || !camera.ill_conditioned.is_empty();
+            let is_own =
+                |out: &Excluded| out.camera.as_ref().is_none_or(|name| *name == camera.name);
+            let mut excluded = found.excluded.iter().filter(|out| is_own(out));
+            let has_question = !is_good
+                || !camera.ill_conditioned.is_empty()
+                || excluded.any(Excluded::may_be_of_lens);
             has_question.then(|| self.and_alone(index, found)).flatten()
         });
         alone.collect()
@@ -325,18 +331,18 @@ fn said(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
         .chain(many_excluded(found))
         .chain(many_panels_excluded(found))
         .collect();
-    // If the model does not fit the lens, single images are not to blame.
+    // If the model does not fit the lens, neither single images nor objects in front of the target are to blame.
     let misfits: BTreeSet<usize> =
         failures.iter().chain(&causes).filter_map(Diagnosis::misfit_of).collect();
-    let is_of_view = |said: &Diagnosis| match said {
+    let is_of_lens = |said: &Diagnosis| match said {
         Diagnosis::CommonOutliers(Finding {
-            pattern: OutlierPattern::View { camera, .. },
+            pattern: OutlierPattern::View { camera, .. } | OutlierPattern::Region { camera, .. },
             is_excluded,
             ..
         }) => misfits.contains(camera) && !is_excluded,
         _ => false,
     };
-    let gross = gross.filter(|said| !is_of_view(said));
+    let gross = gross.filter(|said| !is_of_lens(said));
     let before = failures.into_iter().chain(late).chain(states);
     before.chain(ends).chain(gross).chain(causes).chain(open).collect()
 }

@@ -211,7 +211,8 @@ impl<'a> Messages<'a> {
         if *is_excluded { text + "; excluded" } else { text }
     }
 
-    fn remedied(&self, camera: usize, Remedy { alternative, from_px, to_px }: &Remedy) -> String {
+    fn remedied(&self, camera: usize, remedy: &Remedy) -> String {
+        let Remedy { alternative, from_px, to_px, excluded_views } = remedy;
         let model = self.model(camera);
         let (cause, found) = match *alternative {
             Alternative::Shape => {
@@ -233,6 +234,12 @@ impl<'a> Messages<'a> {
                 format!("the model `{other}`"),
             ),
         };
+        if *excluded_views > 0 {
+            let views = counted(*excluded_views, "excluded view");
+            let text =
+                format!("{found} fits {views} as well as the others ({to_px:.3} px RMS): {cause}");
+            return self.of_camera(camera, text);
+        }
         self.of_camera(
             camera,
             format!("{found} lowers the residuals from {from_px:.3} to {to_px:.3} px RMS: {cause}"),

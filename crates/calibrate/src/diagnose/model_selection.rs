@@ -7,7 +7,7 @@
 use std::collections::BTreeSet;
 
 use crate::adjust::lack_of_fit::{MATTERS, SIGNIFICANT, deviate_of_f};
-use crate::estimate::values::{CameraEstimate, Estimate};
+use crate::estimate::values::{CameraEstimate, Estimate, ViewEstimate};
 use crate::input::calibration::{Calibration, CameraViews, Intrinsics};
 use crate::input::observation::View;
 use crate::input::panel::PanelPrior;
@@ -43,6 +43,9 @@ pub struct Remedy {
     pub from_px: f64,
     /// RMS residual per axis with the remedy, outliers excluded, px.
     pub to_px: f64,
+    /// Number of excluded views that a richer model fits as well as the others; 0 if the remedy explains the residuals
+    /// of the views that were kept.
+    pub excluded_views: usize,
 }
 
 /// The quantity to estimate instead of assuming it.
@@ -87,17 +90,50 @@ impl Calibration {
     }
 
     /// The alternative that explains the residuals of a calibration of one camera significantly
-    /// better, and by an amount that matters. `None` if the noise of detections explains them, or
-    /// if no alternative does.
+    /// better, and by an amount that matters, or that also fits views which were excluded. `None` if the noise of
+    /// detections explains the residuals and no view was excluded, or if no alternative does.
     pub(super) fn remedy(&self, found: &Estimate) -> Option<Remedy> {
-        if is_explained(found) {
-            return None;
-        }
-        match &self.cameras[0].intrinsics {
+        let of_residuals = || match &self.cameras[0].intrinsics {
+            _ if is_explained(found) => None,
             Intrinsics::Unknown(model) => self.remedy_of_found(*model, found),
             Intrinsics::Known(camera) => self.remedy_of_known(camera, found),
             Intrinsics::Near { .. } => None,
+        };
+        lens_first(of_residuals(), || self.remedy_of_excluded(found))
+    }
+
+    /// The richer model that fits most of the excluded views as well as this one fits the others. Corners with wrong
+    /// labels, or of another camera, fit no model; so the excluded corners are right, and the lens departs from the
+    /// model where they lie.
+    fn remedy_of_excluded(&self, found: &Estimate) -> Option<Remedy> {
+        let model = self.cameras[0].intrinsics.model()?;
+        let excluded = found.excluded.iter().filter(|out| out.may_be_of_lens());
+        let excluded: BTreeSet<&str> = excluded.map(|out| out.view.as_str()).collect();
+        let is_out = |view: &&View| excluded.contains(view.name.as_str());
+        let (out, kept): (Vec<&View>, Vec<&View>) = self.cameras[0].views.iter().partition(is_out);
+        let out: Vec<&View> = evenly(&out, TRIAL_VIEWS).copied().collect();
+        if out.is_empty() {
+            return None;
         }
+        let sample = evenly(&kept, TRIAL_VIEWS).chain(&out).map(|view| (*view).clone());
+        let trial = self.of_views(sample.collect());
+        let from_px = found.inlier_rms_px();
+        model.richer().iter().find_map(|&model| {
+            let other = trial.of_intrinsics(model).adjusted().ok()?;
+            let to_px = other.inlier_rms_px();
+            let fits = |view: &&ViewEstimate| {
+                let outliers = view.corners.iter().filter(|corner| corner.outlier).count();
+                excluded.contains(view.name.as_str()) && 2 * outliers < view.corners.len()
+            };
+            let excluded_views = other.cameras[0].views.iter().filter(fits).count();
+            let fits_as_well = to_px * to_px < (1.0 + MATTERS * MATTERS) * from_px * from_px;
+            (fits_as_well && 2 * excluded_views > out.len()).then_some(Remedy {
+                alternative: Alternative::Model(model),
+                from_px,
+                to_px,
+                excluded_views,
+            })
+        })
     }
 
     fn remedy_of_found(&self, model: Model, found: &Estimate) -> Option<Remedy> {
@@ -115,8 +151,10 @@ impl Calibration {
         let tried = shape.into_iter().chain(models).chain(places);
         let tried = tried.filter_map(|(alternative, other)| Some((alternative, other?)));
         let from_px = found.inlier_rms_px();
-        let best = best(&tried_on, tried).filter(|remedy| remedy.to_px < from_px)?;
-        Some(Remedy { from_px, ..best })
+        // The sample may exclude views that the whole calibration includes.
+        let best = lens_first(best(&tried_on, tried), || trial.remedy_of_excluded(&tried_on));
+        let best = best.filter(|remedy| remedy.to_px < from_px)?;
+        Some(Remedy { from_px, excluded_views: 0, ..best })
     }
 
     /// The same if the camera was given: either it is another camera, or the board is bent.
@@ -206,11 +244,22 @@ pub(super) fn is_explained(found: &Estimate) -> bool {
     found.common_px.is_some_and(|common| of_noise(common) > EXPLAINED)
 }
 
+/// A remedy that residuals suggest if it concerns the lens, or else the one that excluded views suggest.
+fn lens_first(
+    of_residuals: Option<Remedy>,
+    of_excluded: impl FnOnce() -> Option<Remedy>,
+) -> Option<Remedy> {
+    let is_of_lens =
+        |remedy: &Remedy| matches!(remedy.alternative, Alternative::Model(_) | Alternative::Camera);
+    of_residuals.filter(is_of_lens).or_else(of_excluded).or(of_residuals)
+}
+
 fn best(found: &Estimate, tried: impl Iterator<Item = (Alternative, Estimate)>) -> Option<Remedy> {
     let from_px = found.inlier_rms_px();
     let better = tried.filter_map(|(alternative, other)| {
         let gain = gain(found, &other, alternative)?;
-        Some((gain, Remedy { alternative, from_px, to_px: other.inlier_rms_px() }))
+        let to_px = other.inlier_rms_px();
+        Some((gain, Remedy { alternative, from_px, to_px, excluded_views: 0 }))
     });
     let better: Vec<_> = better.collect();
     let most = better.iter().map(|(gain, _)| *gain).fold(0.0, f64::max);

@@ -3,9 +3,11 @@
 
 use crate::report::content::Report;
 use crate::report::measures::survey::Survey;
-use deltille_calibrate::{CameraEstimate, Diagnosis, Excluded, Parameter};
+use deltille_calibrate::{CameraEstimate, Corner, Diagnosis, Excluded, Parameter, ViewEstimate};
 use deltille_core::camera::Lens;
-use deltille_core::setting::Setting::{CalibrationBoardShape, CalibrationRefinePanels, PrintScale};
+use deltille_core::setting::Setting::{
+    CalibrateModel, CalibrationBoardShape, CalibrationRefinePanels, PrintScale,
+};
 use deltille_core::statistics::median;
 use deltille_core::words::counted;
 
@@ -220,21 +222,58 @@ fn views(
     });
     let rms = camera.views.iter().map(|view| view.rms_px);
     let median = median(rms.collect()).unwrap_or_default();
-    let bad = camera.views.iter().filter(|view| view.rms_px > BAD_VIEW * median);
-    let bad: Vec<&str> = bad.map(|view| view.name.as_str()).collect();
+    let limit_px = BAD_VIEW * median;
+    let bad = camera.views.iter().filter(|view| view.rms_px > limit_px);
     // Photographs are not the cause if the lens model does not fit, or if the camera has a rolling shutter.
     let is_other = |said: &Diagnosis| match said {
         Diagnosis::RollingShutter { camera, .. } => *camera == index,
         _ => said.misfit_of() == Some(index),
     };
-    if !bad.is_empty() && !report.diagnoses.iter().any(is_other) {
-        let bent = if report.has_panels() { "a bent or loose panel" } else { "a bent board" };
+    if report.diagnoses.iter().any(is_other) {
+        return;
+    }
+    let half_px = half_reach_px(camera);
+    let (far, whole): (Vec<&ViewEstimate>, Vec<&ViewEstimate>) =
+        bad.partition(|view| rms_within_px(camera, view, half_px) <= limit_px);
+    let names = |views: &[&ViewEstimate]| {
+        named(&views.iter().map(|view| view.name.as_str()).collect::<Vec<_>>())
+    };
+    let bent = if report.has_panels() { "a bent or loose panel" } else { "a bent board" };
+    if !whole.is_empty() {
         let text = format!(
             "Views with much larger residuals than the others: {}. Check for motion blur, {bent}, or reflections.",
-            named(&bad)
+            names(&whole)
         );
         add(Weight::Hint, text);
     }
+    if !far.is_empty() {
+        let text = format!(
+            "Views with much larger residuals than the others, but only far from the principal point: {}. The model may \
+             not fit the lens there: try another one, for example {CalibrateModel} auto. If that does not help, check \
+             for motion blur, {bent}, or reflections.",
+            names(&far)
+        );
+        add(Weight::Hint, text);
+    }
+}
+
+/// The distance from the principal point within which half of a camera's corners lie, px; 0 without corners.
+fn half_reach_px(camera: &CameraEstimate) -> f64 {
+    let corners = camera.views.iter().flat_map(|view| &view.corners);
+    let reach = corners.map(|corner| corner.pixel.distance(camera.camera.centre_px));
+    median(reach.collect()).unwrap_or_default()
+}
+
+/// The RMS residual per axis of the corners of a view within this distance from the principal point, px. 0 if all
+/// its corners lie farther away; the RMS residual of the view if its corners are unknown.
+fn rms_within_px(camera: &CameraEstimate, view: &ViewEstimate, reach_px: f64) -> f64 {
+    if view.corners.is_empty() {
+        return view.rms_px;
+    }
+    let is_within = |corner: &&Corner| corner.pixel.distance(camera.camera.centre_px) <= reach_px;
+    let within = view.corners.iter().filter(is_within);
+    let squares: Vec<f64> = within.map(|corner| corner.residual.length_squared()).collect();
+    (squares.iter().sum::<f64>() / (2 * squares.len()).max(1) as f64).sqrt()
 }
 
 /// Adds a warning that lists the excluded views and panels.
@@ -393,7 +432,7 @@ mod tests {
     use deltille_calibrate::Matrix;
 
     use super::*;
-    use deltille_calibrate::{Estimate, LackOfFit, Model, PanelPrior, ViewEstimate};
+    use deltille_calibrate::{Estimate, LackOfFit, Model, PanelPrior};
     use deltille_core::camera::{Camera, Pose};
 
     /// The advice if no lens parameter differs significantly from zero.
@@ -486,6 +525,48 @@ mod tests {
             let found = advice(&report, &[Survey::new(&estimate.cameras[0])]);
             let blur = found.iter().any(|advice| advice.text.contains("motion blur"));
             assert_eq!(blur, is_blamed, "{diagnoses:?}");
+        }
+    }
+
+    /// Residuals that are large only far from the principal point are due to the lens.
+    #[test]
+    fn photographs_are_not_blamed_for_residuals_that_grow_towards_the_rim() {
+        for (large_beyond_px, is_of_lens) in [(150.0, true), (0.0, false)] {
+            let mut estimate = estimate(1, 1);
+            let view = |index: usize| {
+                let corner = |radius: i32| {
+                    let offset = glam::DVec2::new(10.0 * f64::from(radius), 0.0);
+                    let is_large = index == 0 && offset.x > large_beyond_px;
+                    Corner {
+                        panel: deltille_calibrate::PanelRef::ONLY,
+                        row: 0,
+                        col: radius,
+                        pixel: estimate.cameras[0].camera.centre_px + offset,
+                        residual: glam::DVec2::new(0.0, if is_large { 2.0 } else { 0.1 }),
+                        outlier: false,
+                    }
+                };
+                let corners: Vec<Corner> = (0..30).map(corner).collect();
+                let squares: f64 = corners.iter().map(|of| of.residual.length_squared()).sum();
+                ViewEstimate {
+                    name: format!("{index}"),
+                    image: String::new(),
+                    frame: index,
+                    pose: Pose::IDENTITY,
+                    rms_px: (squares / 60.0).sqrt(),
+                    corners,
+                }
+            };
+            estimate.cameras[0].views = (0..12).map(view).collect();
+            let found =
+                advice(&Report::new("camera", &estimate), &[Survey::new(&estimate.cameras[0])]);
+            let said: Vec<&String> = found
+                .iter()
+                .map(|advice| &advice.text)
+                .filter(|text| text.contains("much larger residuals"))
+                .collect();
+            let [said] = said[..] else { panic!("{said:?}") };
+            assert_eq!(said.contains("may not fit the lens there"), is_of_lens, "{said}");
         }
     }
 

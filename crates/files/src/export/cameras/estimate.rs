@@ -476,6 +476,7 @@ pub(in crate::export) fn diagnoses<'a>(
                 camera: name(*camera),
                 rms_px: Some(remedy.from_px),
                 rms_px_then: Some(remedy.to_px),
+                views: Some(remedy.excluded_views).filter(|views| *views > 0),
                 alternative: Some(match remedy.alternative {
                     Alternative::Model(model) => model.to_string(),
                     Alternative::Shape => "board_shape".to_owned(),
