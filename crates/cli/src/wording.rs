@@ -28,6 +28,7 @@ const fn named(setting: Setting) -> (&'static str, &'static str) {
         Setting::CalibrationRefinePanels => ("deltille rig", "--refine-target"),
         Setting::CalibrationWrite => ("deltille calibrate", ""),
         Setting::CharucoDictionary => ("deltille charuco", "--dictionary"),
+        Setting::CharucoLegacy => ("deltille charuco", "--legacy"),
         Setting::CharucoMarkerMm => ("deltille charuco", "--marker"),
         Setting::CharucoSquareMm => ("deltille charuco", "--edge"),
         Setting::CharucoSquares => ("deltille charuco", "--squares"),

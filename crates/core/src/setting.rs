@@ -48,6 +48,7 @@ settings! {
     CalibrationRefinePanels = "Calibration::refine_panels",
     CalibrationWrite = "calibration::write",
     CharucoDictionary = "CharucoSpec::dictionary",
+    CharucoLegacy = "CharucoSpec::legacy",
     CharucoMarkerMm = "CharucoSpec::marker_mm",
     CharucoSquareMm = "CharucoSpec::square_mm",
     CharucoSquares = "CharucoSpec::squares",

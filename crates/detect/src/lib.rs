@@ -33,8 +33,8 @@ mod tiling;
 
 pub use config::DetectorConfig;
 pub use deltille_core::detection::{
-    DecodedTag, Detection, FrameStatus, Grid, GridCorner, Ink, InkEstimate, Reason, ReasonKind,
-    Tone, ToneEstimate, Watch,
+    DecodedTag, Detection, FrameStatus, Grid, GridCorner, Ink, InkEstimate, OtherSettings, Reason,
+    ReasonKind, Tone, ToneEstimate, Watch,
 };
 pub use detector::Detector;
 pub use recognise::{Recognised, Recogniser};

@@ -169,7 +169,9 @@ impl OneTiling {
         };
         let mut reasons = if grids.is_empty() {
             let nothing = || nothing_found::<N>(pyramid, saddles);
-            vec![left_out.first().cloned().unwrap_or_else(nothing)]
+            let mut reason = left_out.first().cloned().unwrap_or_else(nothing);
+            reason.grid = None;
+            vec![reason]
         } else if self.labels.are_wanted() && grids.iter().all(|(_, reason)| reason.is_some()) {
             let of_grid = |(i, (_, reason)): (usize, &(Grid, Option<Reason>))| {
                 let mut reason = reason.clone()?;
@@ -265,6 +267,7 @@ impl OneTiling {
         }
         timing.lap("grids");
         let mut grids = self.plausible::<N>(frame, &found, &mut left_out);
+        let of_found = left_out.len();
         timing.lap("labels");
         if grids.is_empty() && self.labels.are_wanted() {
             let found = foreshortened_grids(finder, pyramid);
@@ -273,9 +276,28 @@ impl OneTiling {
             grids.retain(|(grid, _)| is_labelled(grid));
             timing.lap("foreshortened");
         }
+        if grids.iter().all(|(_, no_labels)| no_labels.is_some()) {
+            let reasons = grids.iter_mut().filter_map(|(_, no_labels)| no_labels.as_mut());
+            let reasons = reasons.chain(left_out.iter_mut().take(of_found));
+            self.name_other_settings(image, &found, reasons);
+        }
         let (grids, optics) = self.refined::<N>(frame, grids);
         timing.lap("refine");
         Found { grids, optics, left_out, saddles: saddles.len() }
+    }
+
+    /// Adds to each reason the settings with which the tags in its grid, one of `found`, would fit.
+    fn name_other_settings<'a>(
+        &self,
+        image: ImageView,
+        found: &[SaddleGrid],
+        reasons: impl Iterator<Item = &'a mut Reason>,
+    ) {
+        let of_tags = reasons.filter(|reason| reason.kind.is_of_tags_read());
+        for reason in of_tags.take(MAX_REASONS) {
+            let grid = reason.grid.and_then(|index| found.get(index));
+            reason.fits = grid.and_then(|grid| self.labels.other_settings(image, grid));
+        }
     }
 
     /// Refines the corners of the grids. Returns those that are still grids, and the optics that
@@ -301,7 +323,8 @@ impl OneTiling {
         (grids, optics)
     }
 
-    /// Returns the labelled grids that may belong to a target. Adds the reasons for the others to `left_out`.
+    /// Returns the labelled grids that may belong to a target. Adds the reasons for the others to `left_out`. Reasons
+    /// refer to grids by their index in `found`.
     fn plausible<const N: usize>(
         &self,
         frame: Frame,
@@ -309,9 +332,14 @@ impl OneTiling {
         left_out: &mut Vec<Reason>,
     ) -> Judged {
         let mut budget = Budget::default();
-        let found = found.iter().map(|corners| FoundGrid { kind: kind::<N>(), corners });
-        let mut grids: Judged =
-            found.flat_map(|grid| self.labels.label(frame.image, grid, &mut budget)).collect();
+        let label = |(index, corners): (usize, &SaddleGrid)| {
+            let grid = FoundGrid { kind: kind::<N>(), corners };
+            let mut labelled = self.labels.label(frame.image, grid, &mut budget);
+            let reasons = labelled.iter_mut().filter_map(|(_, no_labels)| no_labels.as_mut());
+            reasons.for_each(|reason| reason.grid = Some(index));
+            labelled
+        };
+        let mut grids: Judged = found.iter().enumerate().flat_map(label).collect();
         let least = least_untagged_corners(kind::<N>()) as usize;
         let most = self.labels.most_corners();
         let mut refused = None;

@@ -46,6 +46,7 @@ pub fn keyword(setting: Setting) -> String {
         Setting::CalibrationRefinePanels => "refine_target=True",
         Setting::CalibrationWrite => "Calibration.save",
         Setting::CharucoDictionary => "dictionary",
+        Setting::CharucoLegacy => "legacy",
         Setting::CharucoMarkerMm => "marker_mm",
         Setting::CharucoSquareMm => "square_mm",
         Setting::CharucoSquares => "squares",

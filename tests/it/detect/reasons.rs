@@ -7,32 +7,40 @@ use deltille::lattice::GridKind;
 use deltille::layout::{PaperSpec, Printing};
 use deltille::raster::Gray;
 use deltille::synth::{Light, Scene, scene_of_sheet};
-use deltille::targets::{BoardSpec, TagSpec, TargetSpec};
-use glam::DVec3;
+use deltille::targets::{AprilGridSpec, BoardSpec, CharucoSpec, TagSpec, TargetSpec};
+use glam::{DQuat, DVec3};
 
 struct Board {
     detector: Detector,
     scene: Scene,
     centre_mm: DVec3,
+    /// Rotation from the frame of the panel, whose z axis points to the viewer, to that of the scene.
+    front: DQuat,
 }
 
 fn board(grid: GridKind, change: impl Fn(&mut BoardSpec)) -> Board {
     let mut spec = BoardSpec::new(grid, 8, 9, 20.0);
     change(&mut spec);
-    let family = spec.tags.as_ref().map(|tags| Family::shipped(&tags.family).unwrap());
-    let (spec, paper) = (TargetSpec::Board(spec), PaperSpec::default());
-    let target = Printing::build("board", &spec, family.as_ref(), Some(&paper)).unwrap();
+    made(&TargetSpec::Board(spec))
+}
+
+fn made(spec: &TargetSpec) -> Board {
+    let family = spec.family().map(|family| Family::shipped(family).unwrap());
+    let paper = PaperSpec::default();
+    let target = Printing::build("board", spec, family.as_ref(), Some(&paper)).unwrap();
     let detector = Detector::for_target(&target.target, DetectorConfig::default()).unwrap();
     let sheets = target.draw().unwrap().sheets;
     let scene = scene_of_sheet(&target, &sheets[0], 0);
-    Board { detector, scene, centre_mm: target.target.panels[0].middle_mm() }
+    let panel = &target.target.panels[0];
+    let (centre_mm, front) = (panel.middle_mm(), panel.pose.to_pose().rotation);
+    Board { detector, scene, centre_mm, front }
 }
 
 impl Board {
     /// Renders a photograph of 800 × 600 px from a distance of `mm`, slightly from the side.
     fn photograph(&self, mm: f64, light: &Light) -> Gray<u8> {
-        let eye = self.centre_mm + mm * DVec3::new(0.1, -0.2, 0.97);
-        let pose = Pose::looking_at(eye, self.centre_mm, DVec3::Y);
+        let eye = self.centre_mm + mm * (self.front * DVec3::new(0.1, -0.2, 0.97));
+        let pose = Pose::looking_at(eye, self.centre_mm, self.front * DVec3::Y);
         let image = self.scene.render(&Camera::pinhole(800, 600, 0.9), &pose, light);
         image.map(|v| (v * 255.0 + 0.5) as u8)
     }
@@ -87,6 +95,59 @@ fn another_board_is_reported() {
     let seen = wanted.photograph(400.0, &light());
     let mirrored = Gray::from_fn(seen.width(), seen.height(), |x, y| seen.at(799 - x, y));
     assert_eq!(wanted.not_seen_in(&mirrored), [ReasonKind::Mirrored]);
+}
+
+/// The board in an image and the target have the same tags, but different settings: the reason names them.
+#[test]
+fn settings_with_which_the_tags_fit_are_named() {
+    let charuco = |change: &dyn Fn(&mut CharucoSpec)| {
+        let mut spec = CharucoSpec::new([7, 6], 22.0, "DICT_5X5_100");
+        change(&mut spec);
+        TargetSpec::Charuco(spec)
+    };
+    let board = |change: &dyn Fn(&mut BoardSpec)| {
+        let mut spec = BoardSpec::new(GridKind::Deltille, 8, 9, 20.0);
+        change(&mut spec);
+        TargetSpec::Board(spec)
+    };
+    let april = |tags, first_id| {
+        TargetSpec::AprilGrid(AprilGridSpec { first_id, ..AprilGridSpec::new(tags, 30.0) })
+    };
+    for (shown, wanted, named) in [
+        (charuco(&|of| of.legacy = true), charuco(&|_| {}), "OpenCV's legacy pattern (add "),
+        (charuco(&|_| {}), charuco(&|of| of.legacy = true), "OpenCV's current pattern (omit "),
+        (
+            charuco(&|of| of.squares = [6, 7]),
+            charuco(&|_| {}),
+            "width and height swapped (6 columns, 7 rows);",
+        ),
+        (charuco(&|of| of.first_id = 40), charuco(&|_| {}), "with first id 40;"),
+        (
+            charuco(&|of| of.dictionary = "DICT_APRILTAG_25h9".to_owned()),
+            charuco(&|_| {}),
+            "with tags of DICT_APRILTAG_25h9;",
+        ),
+        (
+            board(&|of| (of.rows, of.cols) = (9, 8)),
+            board(&|_| {}),
+            "width and height swapped (8 columns, 9 rows);",
+        ),
+        (board(&|of| of.tags = tags(|t| t.first_id = 300)), board(&|_| {}), "with first id 300;"),
+        (board(&|of| of.tags = tags(|t| t.spacing = 2)), board(&|_| {}), "a tag spacing of 2;"),
+        (
+            board(&|of| of.tags = tags(|t| t.family = "delTag25h9".to_owned())),
+            board(&|of| of.tags = tags(|t| t.family = "d25h9".to_owned())),
+            "with tags of delTag25h9;",
+        ),
+        (april([3, 4], 0), april([4, 3], 0), "width and height swapped (3 columns, 4 rows);"),
+        (april([4, 3], 24), april([4, 3], 0), "with first id 24;"),
+    ] {
+        let image = made(&shown).photograph(400.0, &light());
+        let detection = made(&wanted).detector.detect(&image, "view");
+        assert!(detection.grids.iter().all(|grid| grid.panel.is_none()), "{named}");
+        let said: Vec<String> = detection.reasons.iter().map(ToString::to_string).collect();
+        assert!(said.iter().any(|said| said.contains(named)), "{named} {:?}", detection.reasons);
+    }
 }
 
 /// Blur that leaves corners, but too little of the tags. The reason is never "no tag is seen".

@@ -12,7 +12,7 @@ mod values;
 mod watch;
 
 pub use ink::{Ink, InkEstimate};
-pub use reason::{Reason, ReasonKind};
+pub use reason::{OtherSettings, Reason, ReasonKind};
 pub use tone::{Curve, Piece, TERMS, TONE_PARAMS, Tone, ToneEstimate};
 pub use values::{DecodedTag, Detection, Grid, GridCorner};
 pub use watch::{FrameStatus, Watch};

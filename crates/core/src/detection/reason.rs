@@ -6,6 +6,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use crate::quantity;
+use crate::setting::Setting::CharucoLegacy;
 use crate::words::counted;
 
 /// Why an image, or a grid in it, has no labels. Its display form is a sentence.
@@ -25,6 +26,50 @@ pub struct Reason {
         deserialize_with = "quantity::figure::de"
     )]
     pub figures: BTreeMap<String, f64>,
+    /// Settings of the target with which its tags would fit, if the tags that were read contradict the target.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fits: Option<OtherSettings>,
+}
+
+/// The settings in which a board that fits the tags in an image differs from the target; `None` for settings that are
+/// the same.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
+pub struct OtherSettings {
+    /// Whether a ChArUco board has the pattern of OpenCV before version 4.6.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub legacy: Option<bool>,
+    /// Numbers of columns and rows: of corners, of the squares of a ChArUco board, or of the tags of an AprilGrid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size: Option<[u32; 2]>,
+    /// Id of the first tag.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_id: Option<u32>,
+    /// Distance between tags in rows and columns.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spacing: Option<u32>,
+    /// Name of the family or dictionary of the tags.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub family: Option<String>,
+}
+
+impl fmt::Display for OtherSettings {
+    /// Lists the settings.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let legacy = self.legacy.map(|legacy| match legacy {
+            true => format!("OpenCV's legacy pattern (add {CharucoLegacy})"),
+            false => format!("OpenCV's current pattern (omit {CharucoLegacy})"),
+        });
+        let size = self.size.map(|[columns, rows]| {
+            format!("width and height swapped ({columns} columns, {rows} rows)")
+        });
+        let first_id = self.first_id.map(|id| format!("first id {id}"));
+        let spacing = self.spacing.map(|spacing| format!("a tag spacing of {spacing}"));
+        let family = self.family.as_ref().map(|family| format!("tags of {family}"));
+        let all = [legacy, size, first_id, spacing, family].into_iter().flatten();
+        f.write_str(&all.collect::<Vec<_>>().join(" and "))
+    }
 }
 
 /// The kinds of reasons, each with the names of its [`figures`](Reason::figures).
@@ -96,7 +141,8 @@ impl Reason {
     #[doc(hidden)]
     pub fn of<'a>(kind: ReasonKind, figures: impl IntoIterator<Item = (&'a str, f64)>) -> Self {
         let owned = |(name, figure): (&str, f64)| (name.to_owned(), figure);
-        Self { kind, grid: None, figures: figures.into_iter().map(owned).collect() }
+        let figures = figures.into_iter().map(owned).collect();
+        Self { kind, grid: None, figures, fits: None }
     }
 
     fn figure(&self, name: &str) -> f64 {
@@ -109,6 +155,12 @@ impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let figure = |name| self.figure(name);
         let count = |name, thing| counted(figure(name) as usize, thing);
+        if let Some(settings) = &self.fits {
+            return write!(
+                f,
+                "the tags fit a board with {settings}; make the target file accordingly"
+            );
+        }
         match self.kind {
             ReasonKind::NoCorners => write!(f, "no corners found in the image"),
             ReasonKind::TooDark => write!(

@@ -7,13 +7,14 @@
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::other_settings::SettingsFinder;
 use super::placement::labeller::{Budget, Labelled, TagLabeller};
 use super::why;
 use crate::config::DetectorConfig;
 use crate::grid::outline::{WholeBoard, fit_outline, fit_rectangle};
 use crate::grid::saddle_grid::{SaddleGrid, mirror_image, mirrored};
 use deltille_core::detection::{DecodedTag, Grid, GridCorner};
-use deltille_core::detection::{Reason, ReasonKind};
+use deltille_core::detection::{OtherSettings, Reason, ReasonKind};
 use deltille_core::family::Family;
 use deltille_core::lattice::{GridKind, LatticeMap, Vertex};
 use deltille_core::raster::ImageView;
@@ -44,7 +45,11 @@ enum Source {
     /// By the rows and columns of an entirely visible checkerboard.
     Rectangle([u32; 2]),
     /// By the tags of a target, or by the outlines of its untagged panels.
-    Target { tags: Option<Box<TagLabeller>>, panels: Vec<TargetPanel> },
+    Target {
+        tags: Option<Box<TagLabeller>>,
+        panels: Vec<TargetPanel>,
+        others: Option<Box<SettingsFinder>>,
+    },
     /// By the target, among several, to which a grid belongs; each with its name.
     Scene(Vec<(String, Labels)>),
 }
@@ -107,7 +112,10 @@ impl Labels {
             tagged: !panel.tags.is_empty(),
             corner_ids: panel.corners.iter().map(|c| (Vertex::new(c.row, c.col), c.id)).collect(),
         });
-        let source = Source::Target { tags: tags.map(Box::new), panels: panels.collect() };
+        let others =
+            family.and_then(|family| SettingsFinder::new(target, family, config.max_bit_errors));
+        let (tags, others) = (tags.map(Box::new), others.map(Box::new));
+        let source = Source::Target { tags, panels: panels.collect(), others };
         Self { source, whole, allow_mirrored: config.allow_mirrored }
     }
 
@@ -138,7 +146,7 @@ impl Labels {
                 vec![self.on_outline(found, expected, size, fit)]
             }
             Source::Scene(targets) => in_scene(targets, image, found, budget),
-            Source::Target { tags, panels } => {
+            Source::Target { tags, panels, .. } => {
                 let evidence = tags.as_ref().map(|tags| tags.label(image, grid, budget));
                 let labelled = evidence.as_ref().map_or(&[][..], |evidence| &evidence.found);
                 if labelled.is_empty() {
@@ -164,6 +172,21 @@ impl Labels {
                 // Corners that are joined to a labelled panel but belong to none are not reported.
                 labelled.iter().map(|l| (on_panel(found, &panels[l.panel], l), None)).collect()
             }
+        }
+    }
+
+    /// Returns the settings of a target with which the tags in a grid fit, if they contradict the target itself.
+    pub(crate) fn other_settings(
+        &self,
+        image: ImageView,
+        grid: &SaddleGrid,
+    ) -> Option<OtherSettings> {
+        match &self.source {
+            Source::Target { others, .. } => others.as_ref()?.find(image, grid),
+            Source::Scene(targets) => {
+                targets.iter().find_map(|(_, labels)| labels.other_settings(image, grid))
+            }
+            Source::None | Source::Outline(_) | Source::Rectangle(_) => None,
         }
     }
 

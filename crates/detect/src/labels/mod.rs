@@ -6,10 +6,12 @@
 //! 2. `tags` samples every tile through its map (`tile_map`); `soft_cells` computes the log-odds of its cells.
 //! 3. `tag_words` compares them with the words of the target.
 //! 4. `placement` combines the evidence of all tiles to decide where the grid lies on the target.
-//! 5. `grid_labels` labels each grid, by tags or by an outline; `why` finds the reason for missing labels.
+//! 5. `grid_labels` labels each grid, by tags or by an outline; `why` finds the reason for missing labels, and
+//!    `other_settings` the settings of the target with which the tags would fit.
 
 pub(crate) mod grid_labels;
 pub(crate) mod grid_light;
+pub(crate) mod other_settings;
 pub(crate) mod placement;
 pub(crate) mod soft_cells;
 pub(crate) mod tag_words;
