@@ -25,7 +25,7 @@ use crate::corners::buckets::Buckets;
 use crate::tiling::{CHECKER, step};
 use deltille_core::detection::Grid;
 use deltille_core::lattice::{GridKind, Vertex};
-use deltille_core::raster::Gray;
+use deltille_core::raster::{Gray, ImageView};
 
 /// Maximum fraction of pairs of squares beyond a board that differ like black and white.
 const MAX_DIFFERENT: f64 = 0.2;
@@ -75,7 +75,33 @@ pub(crate) fn go_on(image: &Gray<i16>, grids: &[&Grid]) -> Vec<bool> {
     grids.iter().enumerate().map(goes_on).collect()
 }
 
+/// Returns whether an image shows on every side of a board that it ends there: the vertices beyond most corners of the
+/// side lie in the image, where they have been searched for, and squares beyond a checkerboard do not alternate.
+pub(crate) fn is_seen_to_end(image: ImageView, grid: &Grid) -> bool {
+    let tiles = CheckerTiles::of(image, grid);
+    let size = DVec2::new(image.width() as f64, image.height() as f64) - 1.0;
+    let ends_at = |k: usize, step: Vertex| {
+        let beyond = tiles.corners.iter().filter(|(v, _)| !tiles.has(**v + step));
+        let beyond = beyond.filter_map(|(&v, &corner)| Some(2.0 * corner - tiles.at(v - step)?));
+        let is_seen = |p: &Point| p.cmpge(DVec2::ZERO).all() && p.cmple(size).all();
+        let (count, seen) =
+            beyond.fold((0, 0), |(all, seen), p| (all + 1, seen + usize::from(is_seen(&p))));
+        2 * seen > count && (grid.kind == GridKind::Deltille || tiles.ends_on_side(k))
+    };
+    grid.kind.steps().iter().enumerate().all(|(k, &step)| ends_at(k, step))
+}
+
 impl CheckerTiles<'_> {
+    /// Returns whether squares beyond the end in direction `k` are visible and do not alternate.
+    fn ends_on_side(&self, k: usize) -> bool {
+        let Some([even, odd]) = self.levels() else {
+            return false;
+        };
+        let values = self.values_beyond(k, |_, _| false);
+        let [pairs, different] = pairs(&values, along_end(k), (even - odd).abs());
+        pairs > 0 && different as f64 <= MAX_DIFFERENT * pairs as f64
+    }
+
     /// Returns whether at least a fraction `most` of the pairs of squares beyond the ends
     /// alternates. `is_others` returns whether a corner of another grid is within a distance of a
     /// position, px.
@@ -84,18 +110,14 @@ impl CheckerTiles<'_> {
             return false;
         };
         let contrast = (even - odd).abs();
-        let (mut pairs, mut different) = (0, 0);
+        let (mut count, mut different) = (0, 0);
         for k in 0..CHECKER {
             let values = self.values_beyond(k, &is_others);
-            let along = along_end(k);
-            for (&square, value) in &values {
-                if let Some(next) = values.get(&(square + along)) {
-                    pairs += 1;
-                    different += usize::from((value - next).abs() >= 0.5 * contrast);
-                }
-            }
+            let [all, unequal] = pairs(&values, along_end(k), contrast);
+            count += all;
+            different += unequal;
         }
-        pairs >= MIN_PAIRS && different as f64 >= most * pairs as f64
+        count >= MIN_PAIRS && different as f64 >= most * count as f64
     }
 
     /// Returns the brightness of the squares beyond the ends in direction `k`, by their lowest, leftmost vertices.
@@ -155,6 +177,15 @@ impl CheckerTiles<'_> {
         };
         Some([corner - before, along])
     }
+}
+
+/// Returns the number of pairs of neighbours along a step, and the number of those that differ like black and white.
+fn pairs(values: &BTreeMap<Vertex, f64>, along: Vertex, contrast: f64) -> [usize; 2] {
+    let next =
+        |(&square, value): (&Vertex, &f64)| Some((value - values.get(&(square + along))?).abs());
+    values.iter().filter_map(next).fold([0, 0], |[all, different], difference| {
+        [all + 1, different + usize::from(difference >= 0.5 * contrast)]
+    })
 }
 
 /// Returns the step along an end in direction `k`, up or to the right.

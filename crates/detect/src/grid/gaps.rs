@@ -5,15 +5,16 @@ use std::collections::BTreeSet;
 use glam::DVec2;
 
 use super::edge::{End, MAX_CHORD_RAD, is_clean_somehow};
+use super::edge_crossing::EdgeCrossing;
 use super::effort::Effort;
-use super::links::facing_ray;
+use super::links::{facing_ray, have_similar_contrast};
 use super::local_map::{Bend, LocalMap};
 use super::rectified::Rectified;
 use super::saddle_grid::{Growing, GrownSaddle};
 use crate::corners::saddles::{Saddle, SaddleFinder};
-use crate::corners::sectors::turn;
-use crate::tiling::{neighbours, step};
-use deltille_core::lattice::Vertex;
+use crate::corners::sectors::{Sectors, turn};
+use crate::tiling::{kind, neighbours, step};
+use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::raster::Pyramid;
 
 /// Maximum distance of a missing corner from its predicted position, as a fraction of the edge length there.
@@ -104,7 +105,8 @@ fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<Predicte
 }
 
 /// Returns the corner at `vertex`, if one is found near its prediction. The search uses the image.
-/// For a board at a steep angle, it uses a view rectified by the edges to the neighbours.
+/// For a board at a steep angle, it uses a view rectified by the edges to the neighbours. If there is no saddle, the
+/// edges may still meet.
 fn corner_near<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
@@ -122,7 +124,7 @@ fn corner_near<const N: usize>(
     let levels = neighbours.iter().filter_map(|v| Some(grid.get(v)?.saddle.level));
     let level = levels.max().unwrap_or(0);
     let at_place = |saddle| placed_at(pyramid, grid, vertex, saddle);
-    finder.near(pyramid, level, position, reach, at_place).or_else(|| {
+    let found = finder.near(pyramid, level, position, reach, at_place).or_else(|| {
         let seen = |k: usize| grid.get(&(vertex + step::<N>(k))).map(|g| g.saddle.position);
         let edge = |k: usize| seen(k).map(|place| place - position);
         (0..N).find_map(|k| {
@@ -131,7 +133,43 @@ fn corner_near<const N: usize>(
                 .into_iter()
                 .find_map(|view| view?.find(finder, pyramid, level, at_place))
         })
-    })
+    });
+    found.or_else(|| met_by_edges(pyramid, grid, vertex, position, level))
+}
+
+/// Returns the corner in which the edges to the neighbours of a vertex meet, on a level of the pyramid. All its edges must
+/// be visible, with the colours and the contrast of the neighbours.
+fn met_by_edges<const N: usize>(
+    pyramid: &Pyramid,
+    grid: &Growing<N>,
+    vertex: Vertex,
+    position: DVec2,
+    level: usize,
+) -> Option<GrownSaddle<N>> {
+    let at = |v: Vertex| grid.get(&v).map(|grown| grown.saddle.position);
+    let map = LocalMap::about::<N>(vertex, at, Bend::usual())?;
+    let on_level = |place: DVec2| Pyramid::from_level_0(level, place);
+    let way = |k: usize| {
+        let unseen = || position + map.along(step::<N>(k));
+        on_level(at(vertex + step::<N>(k)).unwrap_or_else(unseen)) - on_level(position)
+    };
+    let ways: [DVec2; N] = std::array::from_fn(way);
+    let met = EdgeCrossing::find((&pyramid.levels()[level]).into(), on_level(position), &ways)?;
+    // Even rays have the dark side on their left.
+    let turn = match kind::<N>() {
+        GridKind::Deltille => 0,
+        GridKind::Checker => (vertex.row + vertex.col).rem_euclid(2) as usize,
+    };
+    let rays = std::array::from_fn(|ray| met.rays[(ray + turn) % N]);
+    let sectors = Sectors { rays, level: met.level, amplitude: met.amplitude };
+    let saddle = Saddle { position: Pyramid::to_level_0(level, met.position), sectors, level };
+    let grown = GrownSaddle { saddle, turn };
+    let is_alike = neighbours::<N>(vertex)
+        .iter()
+        .filter_map(|v| grid.get(v))
+        .all(|other| have_similar_contrast(&other.saddle, &saddle));
+    let has_colours = met.is_dark_left == turn.is_multiple_of(2);
+    (has_colours && is_alike && parallel_to_neighbours(grid, vertex, &grown)).then_some(grown)
 }
 
 /// Returns a saddle point as the corner at `vertex` of a grid. It must have clean edges to at least two neighbours that

@@ -124,7 +124,7 @@ pub(crate) fn facing_ray<const N: usize>(a: &Saddle<N>, i: usize, b: &Saddle<N>)
 }
 
 /// Returns whether the contrasts of two corners may be those of neighbours.
-fn have_similar_contrast<const N: usize>(a: &Saddle<N>, b: &Saddle<N>) -> bool {
+pub(crate) fn have_similar_contrast<const N: usize>(a: &Saddle<N>, b: &Saddle<N>) -> bool {
     let (ours, theirs) = (a.sectors.amplitude, b.sectors.amplitude);
     ours.max(theirs) <= MAX_CONTRAST_RATIO * ours.min(theirs)
 }

@@ -5,7 +5,8 @@
 //!
 //! 1. `links` joins corners along clean edges (`edge`) in their neighbourhood (`neighbours`).
 //! 2. `grow` starts from four corners and grows tile by tile. `gaps` searches for missing corners; where tiles are
-//!    narrow, it searches in the frame of their neighbours (`rectified`). `effort` limits the searches per image.
+//!    narrow, it searches in the frame of their neighbours (`rectified`). Where no corner is
+//!    visible but its edges are, these meet in it (`edge_crossing`). `effort` limits the searches per image.
 //! 3. `parts` joins parts on both sides of an occluder, where the map of a grid (`local_map`)
 //!    continues.
 //! 4. `grids` runs these, and removes duplicates and grids of the cells of tags.
@@ -17,6 +18,7 @@
 pub(crate) mod beyond;
 pub(crate) mod checker_tiles;
 pub(crate) mod edge;
+pub(crate) mod edge_crossing;
 pub(crate) mod effort;
 pub(crate) mod foreshortened;
 pub(crate) mod gaps;

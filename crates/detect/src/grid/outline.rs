@@ -1,10 +1,13 @@
-//! Rows and columns of an entirely visible untagged board, from its outline.
+//! Rows and columns of an untagged board that is visible on every side, from its outline.
 
+use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec2;
 
+use super::local_map::{Bend, LocalMap};
 use super::saddle_grid::SaddleGrid;
+use crate::tiling::CHECKER;
 use deltille_core::lattice::{GridKind, LatticeMap, Vertex};
 
 /// All corners of the only board to detect.
@@ -40,30 +43,61 @@ impl WholeBoard {
     }
 }
 
-/// Returns the motion that maps a whole grid exactly onto an outline, if exactly one does. The
+/// Returns the motion that maps a grid onto an outline, if exactly one does and every side of the outline is seen. The
 /// upright tiles of `inverted` boards are bright, so these boards are rotated by 180°.
 pub(crate) fn fit_outline(
     grid: &SaddleGrid,
     outline: &BTreeSet<Vertex>,
     inverted: bool,
 ) -> Option<LatticeMap> {
-    if grid.len() != outline.len() {
-        return None;
-    }
+    let kind = GridKind::Deltille;
     let half_turn = if inverted { 3 } else { 0 };
-    let mut fitting = [0, 2, 4].into_iter().filter_map(|rotations| {
-        let turned = LatticeMap::new(GridKind::Deltille, rotations + half_turn, Vertex::new(0, 0));
-        // Lowest-leftmost corners must coincide.
-        let lowest = grid.keys().map(|&v| turned.apply(v)).min()?;
-        let map =
-            LatticeMap::new(GridKind::Deltille, rotations + half_turn, *outline.first()? - lowest);
-        grid.keys().all(|&v| outline.contains(&map.apply(v))).then_some(map)
+    let mut fitting = [0, 2, 4].into_iter().flat_map(move |rotations| {
+        let turned = LatticeMap::new(kind, rotations + half_turn, Vertex::new(0, 0));
+        let shifts = shifts(grid.keys().map(move |&v| turned.apply(v)), outline.iter().copied());
+        let map = move |shift| LatticeMap::new(kind, rotations + half_turn, shift);
+        shifts.map(map).filter(|map| grid.keys().all(|&v| outline.contains(&map.apply(v))))
     });
     let map = fitting.next()?;
-    fitting.next().is_none().then_some(map)
+    let seen: BTreeSet<Vertex> = grid.keys().map(|&v| map.apply(v)).collect();
+    let is_only = fitting.next().is_none();
+    (is_only && shows_every_side(kind, &seen, outline)).then_some(map)
 }
 
-/// Returns the motion that labels a grid of a whole checkerboard.
+/// Returns the shifts after which the rows and columns of some vertices are among those of others.
+fn shifts(
+    vertices: impl Iterator<Item = Vertex>,
+    among: impl Iterator<Item = Vertex>,
+) -> impl Iterator<Item = Vertex> {
+    let [[low, high], [least, most]] = [ends(vertices), ends(among)];
+    let rows = least.row - low.row..=most.row - high.row;
+    rows.flat_map(move |row| {
+        (least.col - low.col..=most.col - high.col).map(move |col| Vertex::new(row, col))
+    })
+}
+
+/// Returns the lowest row and column of some vertices, and the highest; zero if there are none.
+fn ends(vertices: impl Iterator<Item = Vertex>) -> [Vertex; 2] {
+    let each = |v: Vertex| [v, v];
+    let wider = |[low, high]: [Vertex; 2], [v, _]: [Vertex; 2]| {
+        [
+            Vertex::new(low.row.min(v.row), low.col.min(v.col)),
+            Vertex::new(high.row.max(v.row), high.col.max(v.col)),
+        ]
+    };
+    vertices.map(each).reduce(wider).unwrap_or([Vertex::new(0, 0); 2])
+}
+
+/// Returns whether more than half of the corners on every side of an outline are seen. Single corners there may belong
+/// to something else, while the real side is hidden.
+fn shows_every_side(kind: GridKind, seen: &BTreeSet<Vertex>, outline: &BTreeSet<Vertex>) -> bool {
+    kind.steps().iter().all(|&step| {
+        let side = || outline.iter().filter(|&&v| !outline.contains(&(v + step)));
+        2 * side().filter(|v| seen.contains(v)).count() > side().count()
+    })
+}
+
+/// Returns the motion that labels a grid of a checkerboard of which every side is seen.
 ///
 /// A rectangle fits in two ways, a square in four. Row 0, column 0 is the lower left corner of the print, rotated so
 /// that the square up and right of this corner is dark. If rows + columns is odd, this determines the orientation.
@@ -75,11 +109,19 @@ pub(crate) fn fit_rectangle(
     inverted: bool,
 ) -> Option<LatticeMap> {
     let (rows, cols) = (i32::try_from(rows).ok()?, i32::try_from(cols).ok()?);
-    let low = grid.keys().fold((i32::MAX, i32::MAX), |(r, c), v| (r.min(v.row), c.min(v.col)));
-    let high = grid.keys().fold((i32::MIN, i32::MIN), |(r, c), v| (r.max(v.row), c.max(v.col)));
-    let size = (high.0 - low.0 + 1, high.1 - low.1 + 1);
-    if grid.len() as i64 != i64::from(rows) * i64::from(cols) {
+    let [low, high] = ends(grid.keys().copied());
+    let size = (high.row - low.row + 1, high.col - low.col + 1);
+    if size != (rows, cols) && size != (cols, rows) {
         return None;
+    }
+    let is_whole = grid.len() as i64 == i64::from(rows) * i64::from(cols);
+    if !is_whole {
+        let vertices = (low.row..=high.row)
+            .flat_map(|row| (low.col..=high.col).map(move |col| Vertex::new(row, col)));
+        let seen = grid.keys().copied().collect();
+        if !shows_every_side(GridKind::Checker, &seen, &vertices.collect()) {
+            return None;
+        }
     }
     // Quarter rotations of the labels relative to the grid's rows and columns: (0, 0) is then at
     // the lower left, lower right, upper right or upper left of the grid.
@@ -87,21 +129,27 @@ pub(crate) fn fit_rectangle(
         size == if rotations.is_multiple_of(2) { (rows, cols) } else { (cols, rows) }
     });
     let origin = move |rotations: u8| {
-        let row = if rotations >= 2 { high.0 } else { low.0 };
-        let col = if matches!(rotations, 1 | 2) { high.1 } else { low.1 };
+        let row = if rotations >= 2 { high.row } else { low.row };
+        let col = if matches!(rotations, 1 | 2) { high.col } else { low.col };
         Vertex::new(row, col)
     };
-    let best = fitting.max_by(|&a, &b| {
-        let key = |rotations: u8| {
+    let at = |v: Vertex| grid.get(&v).map(|placed| placed.position);
+    let place = |v: Vertex| {
+        let predicted = || LocalMap::about::<CHECKER>(v, at, Bend::usual()).map(|map| map.place);
+        at(v).or_else(predicted)
+    };
+    let keyed: Option<Vec<((bool, [f64; 2]), u8)>> = fitting
+        .map(|rotations| {
             let at = origin(rotations);
             // The square that the first row and column span at (0, 0), in the grid's labels.
             let square = (at.row - i32::from(rotations >= 2))
                 + (at.col - i32::from(matches!(rotations, 1 | 2)));
-            let place = grid.get(&at).map_or(DVec2::ZERO, |placed| placed.position);
-            ((square.rem_euclid(2) == 0) != inverted, [place.y, -place.x])
-        };
-        key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
-    })?;
+            let DVec2 { x, y } = place(at)?;
+            Some((((square.rem_euclid(2) == 0) != inverted, [y, -x]), rotations))
+        })
+        .collect();
+    let (_, best) =
+        keyed?.into_iter().max_by(|a, b| a.0.partial_cmp(&b.0).unwrap_or(Ordering::Equal))?;
     let back = -i32::from(best);
     Some(LatticeMap::taking(GridKind::Checker, origin(best), Vertex::new(0, 0), back))
 }

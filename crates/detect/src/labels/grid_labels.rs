@@ -11,8 +11,10 @@ use super::other_settings::SettingsFinder;
 use super::placement::labeller::{Budget, Labelled, TagLabeller};
 use super::why;
 use crate::config::DetectorConfig;
+use crate::grid::beyond::is_seen_to_end;
 use crate::grid::outline::{WholeBoard, fit_outline, fit_rectangle};
 use crate::grid::saddle_grid::{SaddleGrid, mirror_image, mirrored};
+use crate::grid::tile_shape::is_of_squares;
 use deltille_core::detection::{DecodedTag, Grid, GridCorner};
 use deltille_core::detection::{OtherSettings, Reason, ReasonKind};
 use deltille_core::family::Family;
@@ -138,19 +140,21 @@ impl Labels {
             Source::None => vec![(unlabelled(found), None)],
             Source::Outline(outline) => {
                 let fit = |grid: &SaddleGrid| fit_outline(grid, outline, false);
-                vec![self.on_outline(found, outline.len(), size, fit)]
+                vec![self.on_outline(found, outline.len(), image, fit)]
             }
             Source::Rectangle([rows, cols]) => {
                 let fit = |grid: &SaddleGrid| fit_rectangle(grid, [*rows, *cols], false);
                 let expected = *rows as usize * *cols as usize;
-                vec![self.on_outline(found, expected, size, fit)]
+                vec![self.on_outline(found, expected, image, fit)]
             }
             Source::Scene(targets) => in_scene(targets, image, found, budget),
             Source::Target { tags, panels, .. } => {
                 let evidence = tags.as_ref().map(|tags| tags.label(image, grid, budget));
                 let labelled = evidence.as_ref().map_or(&[][..], |evidence| &evidence.found);
                 if labelled.is_empty() {
-                    if let Some(by_outline) = on_untagged_panel(found, panels, false) {
+                    if let Some(by_outline) = on_untagged_panel(found, panels, false)
+                        .or_else(|| on_only_panel(found, panels, image))
+                    {
                         return vec![(by_outline, None)];
                     }
                     if let Some(in_a_mirror) = on_untagged_panel(found, panels, true) {
@@ -220,20 +224,26 @@ impl Labels {
         }
     }
 
-    /// Labels a grid by the outline of an untagged board. The mirror image of the grid may also
+    /// Labels a grid by the outline of an untagged board. The mirror image of a whole board may also
     /// fit.
     fn on_outline(
         &self,
         found: FoundGrid,
         expected: usize,
-        size: [usize; 2],
+        image: ImageView,
         fit: impl Fn(&SaddleGrid) -> Option<LatticeMap>,
     ) -> (Grid, Option<Reason>) {
+        let is_whole = found.corners.len() == expected;
         if let Some(map) = fit(found.corners) {
             let label = |v| Some((map.apply(v), None));
-            return (relabelled(found, label, None, Vec::new()), None);
+            let labelled = relabelled(found, label, None, Vec::new());
+            if is_whole || is_all_there_is(image, &labelled) {
+                return (labelled, None);
+            }
         }
-        let Some(map) = fit(&mirror_image(found.corners)) else {
+        let in_mirror_image = is_whole.then(|| fit(&mirror_image(found.corners))).flatten();
+        let Some(map) = in_mirror_image else {
+            let size = [image.width(), image.height()];
             return (unlabelled(found), Some(why::no_outline(found.corners, expected, size)));
         };
         if !self.allow_mirrored {
@@ -329,10 +339,31 @@ fn have_equal_size(panels: &[TargetPanel], grid: &SaddleGrid) -> bool {
     panels.iter().filter(is_full).count() > 1
 }
 
+/// Returns whether a labelled grid with missing corners shows a board that does not continue beyond its outline.
+fn is_all_there_is(image: ImageView, grid: &Grid) -> bool {
+    is_seen_to_end(image, grid) && is_of_squares(image, grid, false)
+}
+
 /// Returns the grid, direct or mirrored, on the only untagged panel whose outline it fills.
 fn on_untagged_panel(found: FoundGrid, panels: &[TargetPanel], is_mirrored: bool) -> Option<Grid> {
+    let filled = panels.iter().filter(|panel| panel.corner_ids.len() == found.corners.len());
+    on_one_of(found, filled, is_mirrored)
+}
+
+/// Returns a grid with missing corners on the only untagged panel that it fits, if the image shows its ends.
+fn on_only_panel(found: FoundGrid, panels: &[TargetPanel], image: ImageView) -> Option<Grid> {
+    on_one_of(found, panels.iter(), false).filter(|grid| is_all_there_is(image, grid))
+}
+
+/// Returns the grid, direct or mirrored, on the only untagged one of these panels that it fits.
+fn on_one_of<'a>(
+    found: FoundGrid,
+    panels: impl Iterator<Item = &'a TargetPanel>,
+    is_mirrored: bool,
+) -> Option<Grid> {
     let turned = if is_mirrored { mirror_image(found.corners) } else { found.corners.clone() };
-    let mut fitting = panels.iter().filter(|panel| !panel.tagged).filter_map(|panel| {
+    let alike = panels.filter(|panel| !panel.tagged && panel.kind == found.kind);
+    let mut fitting = alike.filter_map(|panel| {
         let map = match panel.kind {
             GridKind::Deltille => {
                 let outline = panel.corner_ids.keys().copied().collect();

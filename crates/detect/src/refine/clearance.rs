@@ -104,6 +104,9 @@ pub(crate) struct Surroundings {
     tags: Vec<Vec<Line>>,
     /// Edges through the corner by increasing angle; empty if nothing is known.
     pub edges: Vec<Edge>,
+    /// Positions of its neighbours, counter-clockwise on the print; those outside the grid are predicted. Empty if
+    /// nothing is known.
+    pub neighbours: Vec<DVec2>,
     /// Whether all its neighbours are in the grid.
     pub is_inner: bool,
 }
@@ -204,7 +207,8 @@ pub(crate) fn surroundings_of(
         let place = |step| seen(step).or_else(|| beyond(step, seen)).unwrap_or_else(|| usual(step));
         let edges = edges(grid, &places, vertex, place);
         let is_inner = grid.kind.steps().iter().all(|&step| seen(step).is_some());
-        let mut found = Surroundings { edges, is_inner, ..Default::default() };
+        let neighbours = grid.kind.steps().iter().map(|&step| place(step)).collect();
+        let mut found = Surroundings { edges, neighbours, is_inner, ..Default::default() };
         for tile in grid.kind.tiles_around(vertex) {
             let corners: Vec<Vertex> = tile.vertices().map(|v| v - vertex).collect();
             let polygon: Vec<DVec2> = corners.iter().map(|&step| place(step)).collect();

@@ -4,8 +4,8 @@
 //! levels of the pyramid if the finest shows too little of it. The curvature of edges by lens distortion follows from
 //! the corners, which are then fitted again. An occluder may still lie next to a corner. The
 //! residual of the model is then larger than elsewhere in the grid, and smaller windows are tried.
-//! A corner at the end of the visible part of the board is dropped if no window shows it cleanly,
-//! because the occluder biases its position.
+//! Where no window shows a corner cleanly, its edges determine its position. A corner at the end of the visible part of
+//! the board is dropped if they are not all visible, because the occluder biases its position.
 
 use std::collections::BTreeMap;
 
@@ -21,6 +21,7 @@ use super::refiner::{
     MIN_MODEL_RADIUS, MIN_PIXELS, ModelFit, Refined, Refinement, Refiner, Room, Sharpness,
 };
 use super::shared_optics::{REACH_PX, REACH_SIGMAS, SAMPLES};
+use crate::grid::edge_crossing::EdgeCrossing;
 use deltille_core::detection::{Grid, GridCorner};
 use deltille_core::lattice::Vertex;
 use deltille_core::raster::{Gray, ImageView, Pyramid};
@@ -171,14 +172,13 @@ impl Refiner {
         let limit = (MAX_RESIDUAL_RATIO * usual).max(MIN_RESIDUAL);
         let (mut kept, mut fits) = (Vec::new(), Vec::new());
         for (i, (corner, (refined, fit))) in grid.corners.iter().zip(refined).enumerate() {
-            if displaced[i] && fit.is_none() {
-                continue;
-            }
             let room = self.whole(&around[i], sharpness);
             let clean = fit.is_some_and(|fit| fit.residual <= limit);
             let modelled =
                 || self.method() == Refinement::Model && self.has_room(image, corner, room);
-            let (refined, fit) = if clean || !judged || !modelled() {
+            let (refined, fit) = if displaced[i] && fit.is_none() {
+                (None, None)
+            } else if clean || !judged || !modelled() {
                 (Some(refined), fit.filter(|_| clean))
             } else {
                 // If the model finds nothing, for example at the edge of an occluder, the position
@@ -187,8 +187,15 @@ impl Refiner {
                 let found = smaller.or(fit.filter(|_| around[i].is_inner));
                 (found.map(Refined::from), found)
             };
-            if let Some(Refined { position: DVec2 { x, y }, cov, .. }) = refined {
-                kept.push(GridCorner { x, y, cov, ..*corner });
+            let by_edges = || met_by_edges(image, corner, &around[i]);
+            let refined = refined.map(|Refined { position: DVec2 { x, y }, cov, .. }| GridCorner {
+                x,
+                y,
+                cov,
+                ..*corner
+            });
+            if let Some(corner) = refined.or_else(by_edges) {
+                kept.push(corner);
                 fits.push(fit);
             }
         }
@@ -234,7 +241,11 @@ impl Refiner {
             let is_corner = is_known && fit.blur_px() <= MAX_BLUR_RATIO * usual_px;
             is_corner.then_some(GridCorner { x, y, cov: Some(cov), ..*corner })
         };
-        grid.corners = grid.corners.iter().zip(&fits).filter_map(settled).collect();
+        let corners = grid.corners.iter().zip(&fits).zip(&around);
+        let held = |(of_fit, around): ((&GridCorner, _), &Surroundings)| {
+            settled(of_fit).or_else(|| met_by_edges(image, of_fit.0, around))
+        };
+        grid.corners = corners.filter_map(held).collect();
     }
 
     /// Returns whether the clear area around a corner suffices for the model.
@@ -358,6 +369,18 @@ impl Refiner {
         });
         fits.find(|fit| fit.residual <= limit)
     }
+}
+
+/// Returns a corner that its pixels do not show at the position in which its edges meet, if all of them are visible.
+fn met_by_edges(
+    image: ImageView,
+    corner: &GridCorner,
+    around: &Surroundings,
+) -> Option<GridCorner> {
+    let met = EdgeCrossing::find(image, corner.position(), &around.neighbours)?;
+    let DVec2 { x, y } = met.position;
+    let is_known = met.cov[0] + met.cov[2] < WORST_SIGMA_PX * WORST_SIGMA_PX;
+    is_known.then_some(GridCorner { x, y, cov: Some(met.cov), ..*corner })
 }
 
 /// Returns the results of `work` for corners 0 to `count` − 1, in order, on the threads of the current pool.
