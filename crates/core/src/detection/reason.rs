@@ -108,7 +108,8 @@ pub enum ReasonKind {
     Mirrored,
     /// The grid fits the target in more than one position: `corners`.
     Ambiguous,
-    /// The grid is smaller or larger than the board whose outline would label it: `corners`, `expected`.
+    /// The grid is larger than the board whose outline would label it, or smaller, and more than one placement may fit:
+    /// `corners`, `expected`.
     NotWhole,
     /// The grid is larger than any board, so it was not searched for one: `corners`, and the
     /// maximum as `expected`.

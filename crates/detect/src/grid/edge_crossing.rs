@@ -13,9 +13,12 @@
 //!      ░░░░░░░│██████
 //! ```
 
+use std::collections::BTreeSet;
+
 use glam::DVec2;
 use nalgebra::{DMatrix, DVector};
 
+use super::edge::MAX_CHORD_RAD;
 use super::links::MAX_CONTRAST_RATIO;
 use deltille_core::raster::ImageView;
 use deltille_core::statistics::median;
@@ -77,11 +80,22 @@ pub(crate) struct EdgeCrossing {
     pub(crate) amplitude: f64,
 }
 
+/// A neighbour of a corner.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Neighbour {
+    /// Its displacement from the corner, px.
+    pub(crate) way: DVec2,
+    /// Whether it is a known corner. Otherwise its position is predicted, and the edge there may have another direction.
+    pub(crate) is_seen: bool,
+}
+
 /// The predicted course of an edge: a parabola through the corner and two opposite neighbours.
 #[derive(Clone, Copy, Debug)]
 struct Course {
     chord: DVec2,
     bend: DVec2,
+    /// How far the edge may be from its course, px: at the corner, and in addition at the neighbour.
+    reach_px: [f64; 2],
     /// Distance of the neighbours beside the edge from it, px.
     across_px: f64,
 }
@@ -100,7 +114,7 @@ impl Course {
 /// A step of brightness across an edge.
 #[derive(Clone, Copy, Debug)]
 struct Step {
-    /// Line through the corner to which it belongs.
+    /// Line from the corner to which it belongs; both halves of an edge may lie on the same line.
     line: usize,
     /// Position along the line, in edges; negative on the opposite side of the corner.
     along: f64,
@@ -110,13 +124,12 @@ struct Step {
 }
 
 impl EdgeCrossing {
-    /// Returns the corner near `place`, px, whose neighbours in counter-clockwise order on the print lie at `ways` from
-    /// there, px. All its edges must be visible, with dark and bright tiles in turn.
-    pub(crate) fn find(image: ImageView, place: DVec2, ways: &[DVec2]) -> Option<Self> {
-        let lines = ways.len() / 2;
-        let courses: Vec<Course> = (0..ways.len()).map(|k| course(ways, k)).collect();
+    /// Returns the corner near `place`, px, with these neighbours in counter-clockwise order on the print. All its edges must be visible, with dark and bright tiles in turn.
+    pub(crate) fn find(image: ImageView, place: DVec2, neighbours: &[Neighbour]) -> Option<Self> {
+        let half = neighbours.len() / 2;
+        let courses: Vec<Course> = (0..neighbours.len()).map(|k| course(neighbours, k)).collect();
         let size_px = (image.width() + image.height()) as f64;
-        if !ways.iter().all(|way| way.length() < size_px) {
+        if !neighbours.iter().all(|neighbour| neighbour.way.length() < size_px) {
             return None;
         }
         let profiles: Vec<Vec<Profile>> = courses
@@ -146,6 +159,11 @@ impl EdgeCrossing {
             .collect();
         let all = || found.iter().flatten();
         let usual = median(all().map(|(_, peak)| peak.step).collect())?;
+        // Where only one half of an edge ends at a known corner, the other half may be bent.
+        let line = |k: usize| {
+            let [first, second] = [k % half, k % half + half].map(|k| neighbours[k].is_seen);
+            if first == second { k % half } else { k }
+        };
         let mut steps = Vec::new();
         for (k, edge) in found.iter().enumerate() {
             let is_visible = |peak: &Peak| MAX_CONTRAST_RATIO * peak.step >= usual;
@@ -153,21 +171,21 @@ impl EdgeCrossing {
             if visible.len() < LEAST_STATIONS {
                 return None;
             }
-            let side = if k < lines { 1.0 } else { -1.0 };
+            let side = if k < half { 1.0 } else { -1.0 };
             steps.extend(visible.into_iter().map(|(profile, peak)| Step {
-                line: k % lines,
+                line: line(k),
                 along: side * profile.t,
                 across: side * profile.left,
                 off_px: side * peak.off_px,
             }));
         }
         let across_px = courses.iter().map(|c| c.across_px).fold(f64::INFINITY, f64::min);
-        let Lines { off, turns, cov } = Lines::through(&steps, lines, across_px)?;
+        let Lines { off, turns, cov } = Lines::through(&steps, neighbours.len(), across_px)?;
         let level = median(all().map(|(_, peak)| peak.level).collect())?;
         let rays = courses
             .iter()
             .enumerate()
-            .map(|(k, course)| (course.chord + turns[k % lines] * course.left(0.0)).to_angle());
+            .map(|(k, course)| (course.chord + turns[line(k)] * course.left(0.0)).to_angle());
         Some(Self {
             position: place + off,
             cov,
@@ -180,21 +198,20 @@ impl EdgeCrossing {
 }
 
 /// Returns the course of the edge to neighbour `k`.
-fn course(ways: &[DVec2], k: usize) -> Course {
-    let n = ways.len();
-    let (there, opposite) = (ways[k], ways[(k + n / 2) % n]);
+fn course(neighbours: &[Neighbour], k: usize) -> Course {
+    let n = neighbours.len();
+    let way = |by: usize| neighbours[(k + by) % n].way;
+    let (there, opposite) = (way(0), way(n / 2));
     let along = (there - opposite).normalize_or_zero();
-    let beside = [1, n - 1, n / 2 + 1, n / 2 - 1].map(|by| ways[(k + by) % n]);
+    let beside = [1, n - 1, n / 2 + 1, n / 2 - 1].map(|by| along.perp_dot(way(by)).abs());
+    let across_px = beside.into_iter().sum::<f64>() / 4.0;
+    let turned_px = if neighbours[k].is_seen { 0.0 } else { MAX_CHORD_RAD.tan() * there.length() };
     Course {
         chord: (there - opposite) / 2.0,
         bend: (there + opposite) / 2.0,
-        across_px: beside.map(|way| along.perp_dot(way).abs()).into_iter().sum::<f64>() / 4.0,
+        reach_px: [(MAX_OFF * across_px).max(MIN_OFF_PX), turned_px],
+        across_px,
     }
-}
-
-/// Returns how far from its predicted course an edge is searched for, px.
-fn reach_px(course: &Course) -> f64 {
-    (MAX_OFF * course.across_px).max(MIN_OFF_PX)
 }
 
 /// Brightness along a line across an edge.
@@ -223,7 +240,8 @@ impl Profile {
     fn read(image: ImageView, middle: DVec2, t: f64, course: &Course) -> Option<Self> {
         let left = course.left(t);
         let side = ((SIDE * course.across_px).max(MIN_SIDE_PX) / SAMPLE_PX).round() as usize;
-        let half = (reach_px(course) / SAMPLE_PX).ceil() as usize + side;
+        let reach_px = course.reach_px[0] + t * course.reach_px[1];
+        let half = (reach_px / SAMPLE_PX).ceil() as usize + side;
         let size = DVec2::new(image.width() as f64, image.height() as f64) - 1.0;
         let value = |i: usize| {
             let at = middle + SAMPLE_PX * (i as f64 - half as f64) * left;
@@ -283,6 +301,7 @@ impl Lines {
         /// Steps that lie off the lines have little weight after this many iterations.
         const ITERATIONS: usize = 4;
         let unknowns = 2 + lines;
+        let used = 2 + steps.iter().map(|step| step.line).collect::<BTreeSet<_>>().len();
         let row = |step: &Step| {
             let mut row = DVector::zeros(unknowns);
             (row[0], row[1], row[2 + step.line]) = (step.across.x, step.across.y, step.along);
@@ -291,7 +310,8 @@ impl Lines {
         let mut weights = vec![1.0; steps.len()];
         let mut fitted = None;
         for _ in 0..ITERATIONS {
-            let mut normal = DMatrix::<f64>::zeros(unknowns, unknowns);
+            // Lines without steps are no unknowns: the prior is a billionth of a step.
+            let mut normal = 1e-9 * DMatrix::<f64>::identity(unknowns, unknowns);
             let mut right = DVector::zeros(unknowns);
             for (step, weight) in steps.iter().zip(&weights) {
                 let row = row(step);
@@ -303,7 +323,7 @@ impl Lines {
             let rests: Vec<f64> =
                 steps.iter().map(|step| step.off_px - row(step).dot(&solution)).collect();
             let sum = rests.iter().zip(&weights).map(|(rest, weight)| weight * rest * rest);
-            let freedom = weights.iter().sum::<f64>() - unknowns as f64;
+            let freedom = weights.iter().sum::<f64>() - used as f64;
             let sigma = (sum.sum::<f64>() / freedom.max(1.0)).sqrt().max(MIN_SIGMA_PX);
             weights = rests.iter().map(|rest| 1.0 / (1.0 + (rest / sigma).powi(2))).collect();
             fitted = Some((solution, inverse, sigma));
@@ -317,5 +337,75 @@ impl Lines {
         let cov = [(0, 0), (0, 1), (1, 1)].map(|at| variance * inverse[at]);
         let turns = (0..lines).map(|line| solution[2 + line]).collect();
         Some(Self { off: DVec2::new(solution[0], solution[1]), turns, cov })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::FRAC_PI_2;
+
+    use super::*;
+    use deltille_core::raster::Gray;
+
+    const EDGE_PX: f64 = 30.0;
+
+    /// Renders a corner of a checkerboard at `place`, turned by 0.2 rad, with something on top of it.
+    fn seen(place: DVec2, on_top: impl Fn(DVec2) -> Option<f64>) -> Gray<f32> {
+        Gray::from_fn(101, 101, |x, y| {
+            let value = |dx: f64, dy: f64| {
+                let off = DVec2::new(x as f64 + dx, y as f64 + dy) - place;
+                let on_print = DVec2::from_angle(-0.2).rotate(off);
+                let tile = if on_print.x * on_print.y > 0.0 { 0.1 } else { 0.8 };
+                on_top(off).unwrap_or(tile)
+            };
+            let parts = [-0.375, -0.125, 0.125, 0.375];
+            let sum: f64 = parts.iter().flat_map(|dx| parts.map(|dy| value(*dx, dy))).sum();
+            (sum / 16.0) as f32
+        })
+    }
+
+    /// Returns neighbours of which one is not known.
+    fn neighbours(turned: f64) -> [Neighbour; 4] {
+        [0u8, 1, 2, 3].map(|k| Neighbour {
+            way: EDGE_PX * DVec2::from_angle(turned - f64::from(k) * FRAC_PI_2),
+            is_seen: k > 0,
+        })
+    }
+
+    fn found(image: &Gray<f32>, near: DVec2) -> Option<EdgeCrossing> {
+        EdgeCrossing::find(image.into(), near, &neighbours(0.24))
+    }
+
+    #[test]
+    fn edges_meet_under_a_speck() {
+        let place = DVec2::new(50.3, 49.8);
+        for grey in [0.0, 0.45, 1.0] {
+            let image = seen(place, |off| (off.length() < 4.0).then_some(grey));
+            let met = found(&image, place + DVec2::new(0.7, -0.9)).unwrap();
+            assert!(met.position.distance(place) < 0.05, "{met:?}");
+            assert!((met.level - 0.45).abs() < 0.05 && (met.amplitude - 0.35).abs() < 0.05);
+            assert!(met.rays.iter().all(|ray| (4.0 * (ray - 0.2)).sin().abs() < 0.05), "{met:?}");
+        }
+    }
+
+    #[test]
+    fn covered_edges_do_not_meet() {
+        let place = DVec2::new(50.3, 49.8);
+        for grey in [0.0, 0.45, 1.0] {
+            let image = seen(place, |off| (off.x > 1.0).then_some(grey));
+            assert!(found(&image, place).is_none(), "{grey}");
+        }
+    }
+
+    #[test]
+    fn dots_that_do_not_meet_are_not_corners() {
+        let image = Gray::from_fn(101, 101, |x, y| {
+            let off = DVec2::new(x as f64, y as f64) - DVec2::splat(50.0);
+            let middles = [DVec2::splat(0.5), DVec2::splat(-0.5)];
+            let is_dot = middles.iter().any(|m| off.distance(EDGE_PX * *m) < 0.48 * EDGE_PX);
+            if is_dot { 0.1f32 } else { 0.8 }
+        });
+        let found = EdgeCrossing::find((&image).into(), DVec2::splat(50.0), &neighbours(0.0));
+        assert!(found.is_none(), "{found:?}");
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use glam::DVec2;
 
 use super::edge::{End, MAX_CHORD_RAD, is_clean_somehow};
-use super::edge_crossing::EdgeCrossing;
+use super::edge_crossing::{EdgeCrossing, Neighbour};
 use super::effort::Effort;
 use super::links::{facing_ray, have_similar_contrast};
 use super::local_map::{Bend, LocalMap};
@@ -123,7 +123,10 @@ fn corner_near<const N: usize>(
     // A blurred corner is found best on the pyramid level of its neighbours.
     let levels = neighbours.iter().filter_map(|v| Some(grid.get(v)?.saddle.level));
     let level = levels.max().unwrap_or(0);
-    let at_place = |saddle| placed_at(pyramid, grid, vertex, saddle);
+    let meeting = |place| met_by_edges(pyramid, grid, vertex, place, level);
+    let at_place = |saddle: Saddle<N>| {
+        placed_at(pyramid, grid, vertex, saddle).or_else(|| meeting(saddle.position))
+    };
     let found = finder.near(pyramid, level, position, reach, at_place).or_else(|| {
         let seen = |k: usize| grid.get(&(vertex + step::<N>(k))).map(|g| g.saddle.position);
         let edge = |k: usize| seen(k).map(|place| place - position);
@@ -134,7 +137,7 @@ fn corner_near<const N: usize>(
                 .find_map(|view| view?.find(finder, pyramid, level, at_place))
         })
     });
-    found.or_else(|| met_by_edges(pyramid, grid, vertex, position, level))
+    found.or_else(|| meeting(position))
 }
 
 /// Returns the corner in which the edges to the neighbours of a vertex meet, on a level of the pyramid. All its edges must
@@ -149,12 +152,13 @@ fn met_by_edges<const N: usize>(
     let at = |v: Vertex| grid.get(&v).map(|grown| grown.saddle.position);
     let map = LocalMap::about::<N>(vertex, at, Bend::usual())?;
     let on_level = |place: DVec2| Pyramid::from_level_0(level, place);
-    let way = |k: usize| {
-        let unseen = || position + map.along(step::<N>(k));
-        on_level(at(vertex + step::<N>(k)).unwrap_or_else(unseen)) - on_level(position)
+    let beside = |k: usize| {
+        let seen = at(vertex + step::<N>(k));
+        let place = seen.unwrap_or_else(|| position + map.along(step::<N>(k)));
+        Neighbour { way: on_level(place) - on_level(position), is_seen: seen.is_some() }
     };
-    let ways: [DVec2; N] = std::array::from_fn(way);
-    let met = EdgeCrossing::find((&pyramid.levels()[level]).into(), on_level(position), &ways)?;
+    let beside: [Neighbour; N] = std::array::from_fn(beside);
+    let met = EdgeCrossing::find((&pyramid.levels()[level]).into(), on_level(position), &beside)?;
     // Even rays have the dark side on their left.
     let turn = match kind::<N>() {
         GridKind::Deltille => 0,

@@ -216,5 +216,49 @@ mod tests {
             }
             prop_assert!(fit_rectangle(&grid, [size[0] + 1, size[1]], inverted).is_none());
         }
+
+        #[test]
+        fn a_missing_corner_changes_no_label(
+            rows in 3..7i32, cols in 3..7i32, missing in 0..49usize, rotations in 0..4u8,
+        ) {
+            let grid = board(rows, cols, Vertex::new(2, -5), rotations);
+            let size = [rows as u32, cols as u32];
+            let motion = fit_rectangle(&grid, size, false).unwrap();
+            let mut seen = grid.clone();
+            let vertex = *grid.keys().nth(missing % grid.len()).unwrap();
+            seen.remove(&vertex);
+            let of_rest = fit_rectangle(&seen, size, false).unwrap();
+            prop_assert!(grid.keys().all(|&v| of_rest.apply(v) == motion.apply(v)));
+            // Without a row, or with a single corner of it, more than one placement may be right.
+            let mut cut = grid.clone();
+            let low = grid.keys().next().unwrap().row;
+            let keep = grid.keys().find(|v| v.row == low).copied();
+            for rest in [keep, None] {
+                cut.retain(|&v, _| v.row != low || Some(v) == rest);
+                prop_assert!(fit_rectangle(&cut, size, false).is_none());
+            }
+        }
+    }
+
+    #[test]
+    fn a_deltille_board_with_a_gap_fits_in_one_place_or_has_no_labels() {
+        use deltille_core::targets::board_vertices;
+        let outline: BTreeSet<Vertex> =
+            board_vertices(GridKind::Deltille, 6, 7).into_iter().collect();
+        let placed = PlacedSaddle { position: DVec2::ZERO, amplitude: 1.0 };
+        let turned = LatticeMap::new(GridKind::Deltille, 2, Vertex::new(3, -4));
+        let whole: SaddleGrid = outline.iter().map(|&v| (turned.apply(v), placed)).collect();
+        let map = fit_outline(&whole, &outline, false).unwrap();
+        for &missing in whole.keys() {
+            let mut seen = whole.clone();
+            seen.remove(&missing);
+            assert_eq!(fit_outline(&seen, &outline, false), Some(map), "{missing:?}");
+        }
+        let part = |row| {
+            let seen = outline.iter().filter(|v| v.row != row);
+            seen.map(|&v| (turned.apply(v), placed)).collect::<SaddleGrid>()
+        };
+        assert_eq!(fit_outline(&part(0), &outline, false), None);
+        assert_eq!(fit_outline(&part(5), &outline, false), None);
     }
 }

@@ -14,6 +14,7 @@ use std::f64::consts::PI;
 
 use glam::{DMat2, DVec2};
 
+use crate::grid::edge_crossing::Neighbour;
 use crate::grid::local_map::{Bend, LocalMap};
 use crate::tiling::{CHECKER, DELTILLE};
 use deltille_core::detection::{Grid, GridCorner};
@@ -104,9 +105,9 @@ pub(crate) struct Surroundings {
     tags: Vec<Vec<Line>>,
     /// Edges through the corner by increasing angle; empty if nothing is known.
     pub edges: Vec<Edge>,
-    /// Positions of its neighbours, counter-clockwise on the print; those outside the grid are predicted. Empty if
+    /// Its neighbours, counter-clockwise on the print; those outside the grid are predicted. Empty if
     /// nothing is known.
-    pub neighbours: Vec<DVec2>,
+    pub neighbours: Vec<Neighbour>,
     /// Whether all its neighbours are in the grid.
     pub is_inner: bool,
 }
@@ -207,7 +208,8 @@ pub(crate) fn surroundings_of(
         let place = |step| seen(step).or_else(|| beyond(step, seen)).unwrap_or_else(|| usual(step));
         let edges = edges(grid, &places, vertex, place);
         let is_inner = grid.kind.steps().iter().all(|&step| seen(step).is_some());
-        let neighbours = grid.kind.steps().iter().map(|&step| place(step)).collect();
+        let neighbour = |&step| Neighbour { way: place(step), is_seen: seen(step).is_some() };
+        let neighbours = grid.kind.steps().iter().map(neighbour).collect();
         let mut found = Surroundings { edges, neighbours, is_inner, ..Default::default() };
         for tile in grid.kind.tiles_around(vertex) {
             let corners: Vec<Vertex> = tile.vertices().map(|v| v - vertex).collect();
