@@ -208,3 +208,65 @@ fn visible_corners_of_a_covered_board_are_found_in_position() {
         assert_eq!(dr.abs() + dc.abs(), 1);
     }
 }
+
+/// Returns the labels and errors in an image of the board from above, after a change of each pixel by its position and
+/// the corners in the image.
+fn seen_after(change: impl Fn(DVec2, &[DVec2], f32) -> f32) -> (Detection, Vec<f64>) {
+    let camera = Camera::pinhole(1280, 960, 0.9);
+    let pose = seen_from(&mut ChaCha8Rng::seed_from_u64(5), 330.0, 0.3);
+    let scene = board(false);
+    let truth = scene.truth(&camera, &pose, 0.0);
+    let corners: Vec<DVec2> = truth.corners.iter().map(|c| DVec2::new(c.x, c.y)).collect();
+    let image = scene.render(&camera, &pose, &Light::default());
+    let changed = Gray::from_fn(image.width(), image.height(), |x, y| {
+        change(DVec2::new(x as f64, y as f64), &corners, image.at(x, y))
+    });
+    let detection = detect(&changed, GridKind::Checker, SIZE);
+    assert_eq!(detection.grids.len(), 1);
+    let is_labelled = detection.reasons.is_empty();
+    let errors = if is_labelled { errors(&detection.grids[0], &truth, false) } else { Vec::new() };
+    (detection, errors)
+}
+
+/// A speck hides a corner, and the edge of a shadow ends the similarity of its tiles. Its edges still meet.
+#[test]
+fn specks_and_edges_of_shadows_cost_no_corner() {
+    for grey in [0.0, 0.5, 1.0] {
+        let (_, errors) = seen_after(|place, corners, value| {
+            let specks = corners.iter().step_by(7);
+            let is_on = specks.into_iter().any(|corner| corner.distance(place) < 3.0);
+            if is_on { grey } else { value }
+        });
+        assert_eq!(errors.len(), 54, "specks of {grey}");
+        assert!(errors.iter().all(|error| *error < 0.4), "{errors:?}");
+    }
+    for corner in [0, 20, 33, 53] {
+        let (_, errors) = seen_after(|place, corners, value| {
+            let across = (place - corners[corner]).dot(DVec2::from_angle(0.6));
+            value * (0.4 + 0.6 / (1.0 + (-across).exp())) as f32
+        });
+        assert_eq!(errors.len(), 54, "a shadow through corner {corner}");
+        assert!(errors.iter().all(|error| *error < 1.5), "{errors:?}");
+    }
+}
+
+/// Half the length of an edge in [`seen_after`], px.
+const HALF_EDGE_PX: f64 = 35.0;
+
+/// Only one placement of the board has all corners that are seen beside a finger on one of its own.
+#[test]
+fn a_covered_corner_of_the_board_costs_no_label_but_a_covered_side_costs_all() {
+    let covered = |count: usize| {
+        seen_after(move |place, corners, value| {
+            let is_under = |corner: &DVec2| corner.distance(place) < HALF_EDGE_PX;
+            if corners.iter().take(count).any(is_under) { 0.5 } else { value }
+        })
+    };
+    for count in [1, 2, 3] {
+        let (_, errors) = covered(count);
+        assert!(errors.len() >= 54 - count, "{count}: {}", errors.len());
+        assert!(errors.iter().all(|error| *error < 1.5), "{count}: {errors:?}");
+    }
+    let (detection, _) = covered(COLS as usize);
+    assert_eq!(detection.reasons.len(), 1, "{:?}", detection.grids[0].corners.len());
+}

@@ -124,7 +124,8 @@ struct Step {
 }
 
 impl EdgeCrossing {
-    /// Returns the corner near `place`, px, with these neighbours in counter-clockwise order on the print. All its edges must be visible, with dark and bright tiles in turn.
+    /// Returns the corner near `place`, px, with these neighbours in counter-clockwise order on the print. All its edges
+    /// must be visible, with dark and bright tiles in turn.
     pub(crate) fn find(image: ImageView, place: DVec2, neighbours: &[Neighbour]) -> Option<Self> {
         let half = neighbours.len() / 2;
         let courses: Vec<Course> = (0..neighbours.len()).map(|k| course(neighbours, k)).collect();
