@@ -138,7 +138,7 @@ pub(crate) fn fit_rectangle(
         let predicted = || LocalMap::about::<CHECKER>(v, at, Bend::usual()).map(|map| map.place);
         at(v).or_else(predicted)
     };
-    let keyed: Option<Vec<((bool, [f64; 2]), u8)>> = fitting
+    let keyed: Option<Vec<_>> = fitting
         .map(|rotations| {
             let at = origin(rotations);
             // The square that the first row and column span at (0, 0), in the grid's labels.
@@ -221,6 +221,8 @@ mod tests {
         fn a_missing_corner_changes_no_label(
             rows in 3..7i32, cols in 3..7i32, missing in 0..49usize, rotations in 0..4u8,
         ) {
+            // The lowest corners of a square may be equally low.
+            prop_assume!(rows != cols);
             let grid = board(rows, cols, Vertex::new(2, -5), rotations);
             let size = [rows as u32, cols as u32];
             let motion = fit_rectangle(&grid, size, false).unwrap();
