@@ -183,7 +183,8 @@ impl Detector {
     /// was given, or if a second pass with the combined estimate would change nothing.
     pub fn ink_of_all(&self, found: &[Option<InkEstimate>]) -> Option<InkEstimate> {
         let known: Vec<InkEstimate> = found.iter().copied().flatten().collect();
-        let is_worth = self.main.is_ink_asked() && found.len() > 1;
+        // Corners of checkerboards do not move with their edges, and blooming differs between images.
+        let is_worth = self.main.is_ink_asked() && found.len() > 1 && !self.main.is_of_squares();
         InkEstimate::of_all(&known).filter(|ink| ink.used && is_worth)
     }
 

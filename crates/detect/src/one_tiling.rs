@@ -10,11 +10,13 @@ use crate::corners::saddles::{SaddleFinder, too_many};
 use crate::grid::beyond::go_on;
 use crate::grid::foreshortened::foreshortened_grids;
 use crate::grid::grids::grids;
+use crate::grid::moved_edges::grids_of_moved_edges;
 use crate::grid::saddle_grid::SaddleGrid;
-use crate::grid::tile_shape::is_of_squares;
+use crate::grid::tile_shape::{LARGE_INK, is_of_squares};
 use crate::labels::grid_labels::{FoundGrid, Labels, MAX_CORNERS, report_once};
 use crate::labels::placement::labeller::Budget;
 use crate::refine::clearance::TagAreas;
+use crate::refine::edge_shift::large_shift;
 use crate::refine::model::fitter::CornerFitter;
 use crate::refine::optics::Optics;
 use crate::refine::refine_grid::{Level, is_sampled, sharp_level};
@@ -139,6 +141,11 @@ impl OneTiling {
     /// Returns whether the ink spread is estimated from images.
     pub(super) fn is_ink_asked(&self) -> bool {
         !self.is_ink_given
+    }
+
+    /// Returns whether these stages find checkerboards.
+    pub(super) fn is_of_squares(&self) -> bool {
+        matches!(self.finder, Finder::Checker(_))
     }
 
     /// Returns the detection of an image. `name` is copied to the result.
@@ -269,6 +276,20 @@ impl OneTiling {
         let mut grids = self.plausible::<N>(frame, &found, &mut left_out);
         let of_found = left_out.len();
         timing.lap("labels");
+        let is_sought = self.labels.are_wanted() || self.labels.whole().is_some();
+        let is_identified = |(grid, reason): &(Grid, Option<Reason>)| {
+            is_labelled(grid) || is_sought && reason.is_none()
+        };
+        if is_sought && !grids.iter().any(is_identified) {
+            let found = grids_of_moved_edges(finder, pyramid, self.labels.whole());
+            let mut identified = self.plausible::<N>(frame, &found, &mut Vec::new());
+            // Halftones look like boards whose edges have moved.
+            identified.retain(is_identified);
+            if !identified.is_empty() {
+                grids = identified;
+            }
+            timing.lap("moved edges");
+        }
         if grids.is_empty() && self.labels.are_wanted() {
             let found = foreshortened_grids(finder, pyramid);
             grids = self.plausible::<N>(frame, &found, &mut left_out);
@@ -315,8 +336,12 @@ impl OneTiling {
             .map(|(grid, _)| grid)
             .collect();
         let may_have_tags = !self.tag_areas.is_empty();
+        // Halftones look like boards of unknown size whose edges have moved.
+        let ink = self.labels.whole().map_or(0.0, |_| optics.ink());
         grids.retain(|(grid, _)| {
-            is_labelled(grid) || is_of_squares(frame.image, grid, may_have_tags)
+            // An outline alone does not distinguish squares that have shrunk from dots.
+            let is_certain = is_confirmed(grid) || is_labelled(grid) && ink.abs() <= LARGE_INK;
+            is_certain || is_of_squares(frame.image, grid, ink, may_have_tags)
         });
         // Refinement has removed some false corners.
         refuse_patterns(frame.pyramid, &mut grids);
@@ -390,30 +415,39 @@ impl OneTiling {
         grids: &mut [Grid],
     ) -> (Optics, Vec<bool>) {
         let levels = frame.pyramid.levels();
-        let finest = Level { image: frame.image, number: 0, coarser: &levels[1..] };
-        let blurs = self.refiner.blurs(fitter, finest, grids, &self.tag_areas);
-        for number in (1..=sharp_level(&blurs, levels.len())).rev() {
+        let finest = Level { image: frame.image, enlarged: 0, coarser: &levels[1..] };
+        let shift = large_shift(frame.image, grids).filter(|_| self.refiner.is_ink_open());
+        let refiner = match shift {
+            Some(shift) => &self.refiner.with_ink_near(shift.edges),
+            None => &self.refiner,
+        };
+        let least = shift.map_or(0, |shift| shift.level(levels.len()));
+        let blurs = refiner.blurs(fitter, finest, grids, &self.tag_areas);
+        let sharp = sharp_level(&blurs, levels.len());
+        for number in (least.max(1)..=sharp.max(least)).rev() {
             let image = ImageView::from(&levels[number]);
-            let level = Level { image, number, coarser: &levels[number + 1..] };
+            let enlarged = if number > sharp { 0 } else { number };
+            let level = Level { image, enlarged, coarser: &levels[number + 1..] };
             grids.iter_mut().for_each(|grid| grid.moved_to_level(number));
-            let blurs = self.refiner.blurs(fitter, level, grids, &self.tag_areas);
-            let optics = self.refiner.optics(fitter, level, grids, &blurs, &self.tag_areas);
+            let blurs = refiner.blurs(fitter, level, grids, &self.tag_areas);
+            let optics = refiner.optics(fitter, level, grids, &blurs, &self.tag_areas);
             // Motion blur leaves an image sharp perpendicular to the motion.
-            let found = is_sampled(&blurs, optics.narrowest())
-                .then(|| self.refine_under(fitter, image, grids, &optics, &blurs));
+            let found = (number == least || is_sampled(&blurs, optics.narrowest()))
+                .then(|| self.refine_under(refiner, fitter, image, grids, &optics, &blurs));
             grids.iter_mut().for_each(|grid| grid.moved_from_level(number));
             if let Some(are_waves) = found {
                 return (optics, are_waves);
             }
         }
-        let optics = self.refiner.optics(fitter, finest, grids, &blurs, &self.tag_areas);
-        let are_waves = self.refine_under(fitter, frame.image, grids, &optics, &blurs);
+        let optics = refiner.optics(fitter, finest, grids, &blurs, &self.tag_areas);
+        let are_waves = self.refine_under(refiner, fitter, frame.image, grids, &optics, &blurs);
         (optics, are_waves)
     }
 
     /// Refines the grids in an image with these optics and blurs, px; see [`Self::refine`].
     fn refine_under(
         &self,
+        refiner: &Refiner,
         fitter: &mut CornerFitter,
         image: ImageView,
         grids: &mut [Grid],
@@ -422,7 +456,7 @@ impl OneTiling {
     ) -> Vec<bool> {
         let refine = |(grid, &blur_px): (&mut Grid, &Option<f64>)| {
             let edge_px = grid.edge_px().unwrap_or(0.0);
-            self.refiner.refine_grid(fitter, image, grid, &self.tag_areas, optics, blur_px);
+            refiner.refine_grid(fitter, image, grid, &self.tag_areas, optics, blur_px);
             blur_px.is_some_and(|blur_px| blur_px > max_untagged_blur(grid.kind) * edge_px)
         };
         grids.iter_mut().zip(blurs).map(refine).collect()

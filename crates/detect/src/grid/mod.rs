@@ -26,6 +26,7 @@ pub(crate) mod grids;
 pub(crate) mod grow;
 pub(crate) mod links;
 pub(crate) mod local_map;
+pub(crate) mod moved_edges;
 pub(crate) mod neighbours;
 pub(crate) mod outline;
 pub(crate) mod parts;

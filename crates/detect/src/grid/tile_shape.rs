@@ -16,7 +16,7 @@
 
 use std::collections::BTreeSet;
 
-use super::checker_tiles::{CheckerTiles, Point, Square, parity};
+use super::checker_tiles::{CheckerTiles, Point, Square, WholeSquare, parity};
 use deltille_core::detection::Grid;
 use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::raster::ImageView;
@@ -34,6 +34,9 @@ const PLAIN: f64 = 1.0 / 3.0;
 /// Minimum F_33 of squares, relative to its ideal value, the product of F_3 along and across.
 const MIN_PRODUCT: f64 = 0.5;
 
+/// Displacement of the edges above which F_3 of all squares is less than two thirds of its value.
+pub(crate) const LARGE_INK: f64 = 0.05;
+
 /// Tolerance of these limits, in standard deviations, measured by waves that tiles of boards and dots do not have.
 const DEVIATIONS: f64 = 3.0;
 
@@ -49,9 +52,9 @@ const WRONG: f64 = 0.75;
 /// Number of samples along and across a square.
 const SAMPLES: usize = 8;
 
-/// Returns whether an untagged grid consists of squares, after refinement of its corners. Returns true for deltille
-/// grids.
-pub(crate) fn is_of_squares(image: ImageView, grid: &Grid, may_have_tags: bool) -> bool {
+/// Returns whether an untagged grid consists of squares, after refinement of its corners. Its dark areas have grown by
+/// `ink` edges on every side. Returns true for deltille grids.
+pub(crate) fn is_of_squares(image: ImageView, grid: &Grid, ink: f64, may_have_tags: bool) -> bool {
     if grid.kind == GridKind::Deltille {
         return true;
     }
@@ -59,7 +62,7 @@ pub(crate) fn is_of_squares(image: ImageView, grid: &Grid, may_have_tags: bool) 
     let count = tiles.whole_squares().count();
     count >= MIN_SQUARES
         && has_few_wrong_squares(&tiles, count)
-        && Waves::of(&tiles).is_none_or(|waves| waves.are_of_squares(may_have_tags))
+        && Waves::of(&tiles, ink).is_none_or(|waves| waves.are_of_squares(may_have_tags))
 }
 
 /// Amplitudes of other waves, relative to F_11.
@@ -74,17 +77,28 @@ struct Waves {
 }
 
 impl Waves {
-    /// Measures the whole squares together.
-    fn of(tiles: &CheckerTiles) -> Option<Self> {
+    /// Measures the whole squares together. If ink has moved their edges far, only those that have shrunk are measured,
+    /// each within its edges: the profile of all squares together has no F_3 if the edges move by a sixth.
+    fn of(tiles: &CheckerTiles, ink: f64) -> Option<Self> {
         let part = |i: usize| (i as f64 + 0.5) / SAMPLES as f64;
         let mut mean = [[0.0; SAMPLES]; SAMPLES];
-        for square in tiles.whole_squares() {
+        let levels = tiles.levels().unwrap_or_default();
+        let [even, odd] = levels;
+        let shrunk =
+            (ink.abs() > LARGE_INK).then_some(usize::from((even < odd) == (ink < 0.0)) ^ 1);
+        // Squares that have shrunk lie in an area of the other colour.
+        let around = shrunk.map_or((even + odd) / 2.0, |of| levels[1 - of]);
+        let size = shrunk.map_or(1.0, |_| 1.0 - 2.0 * ink.abs());
+        let place = |i: usize| 0.5 + size * (part(i) - 0.5);
+        let is_measured =
+            |square: &WholeSquare| shrunk.is_none_or(|of| parity(square.vertex) == of);
+        for square in tiles.whole_squares().filter(is_measured) {
             let sign = [1.0, -1.0][parity(square.vertex)];
             for (i, row) in mean.iter_mut().enumerate() {
                 for (j, sum) in row.iter_mut().enumerate() {
                     // At the border of the image, a part of a square has no information.
-                    let value = tiles.brightness(square.place(part(j), part(i)));
-                    *sum += sign * value.unwrap_or(0.0);
+                    let value = tiles.brightness(square.place(place(j), place(i)));
+                    *sum += sign * value.map_or(0.0, |value| value - around);
                 }
             }
         }

@@ -341,7 +341,7 @@ fn have_equal_size(panels: &[TargetPanel], grid: &SaddleGrid) -> bool {
 
 /// Returns whether a labelled grid with missing corners shows a board that does not continue beyond its outline.
 fn is_all_there_is(image: ImageView, grid: &Grid) -> bool {
-    is_seen_to_end(image, grid) && is_of_squares(image, grid, false)
+    is_seen_to_end(image, grid) && is_of_squares(image, grid, 0.0, false)
 }
 
 /// Returns the grid, direct or mirrored, on the only untagged panel whose outline it fills.

@@ -16,11 +16,21 @@
 //!     f = erf(h₁/√2) erf(h₂/√2) + 2/π ∫₀^{asin ρ} exp(−(h₁² + h₂² − 2 h₁h₂ sin φ)/(2 cos² φ)) dφ
 //! ```
 //!
+//! Ink or blooming moves all edges into the bright or the dark tiles. Three lines then do not meet. Between them is a
+//! triangle in which the alternating sum is ±3 instead of ±1. With F(i, j) = E[sᵢ sⱼ], the indicator of the triangle
+//! is (1 − F(1,2) + F(1,3) − F(2,3))/4, since one of the eight combinations of three half-planes is empty. With two
+//! edges, both halves of each line move in opposite directions by d₁ and d₂, and dark tiles overlap or part:
+//!
+//! ```text
+//!     f = ½ [F(h₁ + d₁, h₂ ± d₂) + F(h₁ − d₁, h₂ ∓ d₂)] − ½ Σ [erf((hₖ + dₖ)/√2) − erf((hₖ − dₖ)/√2)]
+//! ```
+//!
+//! with the upper sign where areas of f = −1 have grown.
+//!
 //! All computations are straight-line single precision, so that the compiler can vectorise over pixels. Errors are
 //! below 3·10⁻⁶ (tests).
 
 use std::f32::consts::{FRAC_1_SQRT_2, FRAC_2_PI, LN_2, LOG2_E};
-use std::f64::consts::PI;
 
 /// √(2/π): the slope of erf(h/√2) at 0.
 const SLOPE: f32 = 0.797_884_6;
@@ -50,21 +60,27 @@ pub(crate) struct Shade<const K: usize> {
     pub f: f32,
     /// ∂f/∂h_k.
     pub slopes: [f32; K],
-    /// ∂f/∂ρ; 0 if edges do not interact.
-    pub correlation: f32,
+    /// ∂f/∂ρ for each of [`PAIRS`]; only the first [`Pattern::CORRELATED`] are used.
+    pub correlations: [f32; PAIRS.len()],
     /// ∂f/∂α, with the strength α of a halo; 0 without one.
     pub halo: f32,
-    /// Derivatives with respect to the parameters of a triangle between the edges; 0 without one.
-    pub triangle: [f32; TRIANGLE_PARAMS],
+    /// ∂f/∂d_k, if the halves of the edges are displaced.
+    pub shifts: [f32; K],
     /// Derivatives with respect to half of the motion across each edge; 0 without motion.
     pub way: [f32; K],
 }
+
+/// Pairs of edges.
+pub(crate) const PAIRS: [[usize; 2]; 3] = [[0, 1], [0, 2], [1, 2]];
 
 /// The brightness around a corner of K edges.
 ///
 /// A trait, because its methods are compiled for the processor of the loop into which they are inlined. Closures that
 /// are called twice are not.
 pub(crate) trait Pattern<const K: usize> {
+    /// Number of [`PAIRS`] on whose correlation it depends.
+    const CORRELATED: usize;
+
     /// Returns the brightness at distances h from the edges.
     fn at(&self, h: [f32; K]) -> Shade<K>;
 }
@@ -74,6 +90,8 @@ pub(crate) trait Pattern<const K: usize> {
 pub(crate) struct Deltille;
 
 impl Pattern<3> for Deltille {
+    const CORRELATED: usize = 0;
+
     #[inline(always)]
     fn at(&self, h: [f32; 3]) -> Shade<3> {
         deltille(h)
@@ -81,6 +99,8 @@ impl Pattern<3> for Deltille {
 }
 
 impl<const NODES: usize> Pattern<2> for Orthant<NODES> {
+    const CORRELATED: usize = 1;
+
     #[inline(always)]
     fn at(&self, h: [f32; 2]) -> Shade<2> {
         self.checker(h)
@@ -102,6 +122,8 @@ pub(crate) struct Haloed<P> {
 }
 
 impl<const K: usize, P: Pattern<K>> Pattern<K> for Haloed<P> {
+    const CORRELATED: usize = P::CORRELATED;
+
     #[inline(always)]
     fn at(&self, h: [f32; K]) -> Shade<K> {
         let (sharp, wide) = (self.pattern.at(h), self.wide.at(h.map(|h| h * self.narrower)));
@@ -109,115 +131,83 @@ impl<const K: usize, P: Pattern<K>> Pattern<K> for Haloed<P> {
         Shade {
             f: both(sharp.f, wide.f),
             slopes: std::array::from_fn(|k| both(sharp.slopes[k], wide.slopes[k] * self.narrower)),
-            correlation: both(sharp.correlation, wide.correlation),
+            correlations: std::array::from_fn(|p| {
+                both(sharp.correlations[p], wide.correlations[p])
+            }),
             halo: sharp.f - wide.f,
-            triangle: [0.0; TRIANGLE_PARAMS],
+            shifts: std::array::from_fn(|k| both(sharp.shifts[k], wide.shifts[k] * self.narrower)),
             way: std::array::from_fn(|k| both(sharp.way[k], wide.way[k] * self.narrower)),
         }
     }
 }
 
-/// The triangle between three edges that do not meet in a point, because dark areas have grown or shrunk. The dark
-/// tiles overlap there, where the alternating sum is −3. Blurred, it is nearly a Gaussian with the area, centroid and
-/// variance of the triangle.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Overlap {
-    /// 1 if dark areas have grown, −1 if they have shrunk.
-    sign: f64,
-    /// Logarithm of its contribution to f at its centre.
-    ln_height: f64,
-    /// Its centre: distances from the first two edges in units of the blur.
-    middle: [f64; 2],
-    /// Inverse of its covariance: xx, xy, yy.
-    inverse: [f64; 3],
-}
-
-impl Overlap {
-    /// Creates the triangle between h₁ = 0, h₂ = 0 and h₃ = a·h₁ + b·h₂ + c = 0, under a blur of this covariance along
-    /// the first two normals.
-    pub(crate) fn between([a, b, c]: [f64; 3], [xx, xy, yy]: [f64; 3], sign: f64) -> Self {
-        let [x, y] = [-c / a, -c / b];
-        // The covariance of a triangle with the sides x and y along the axes: x²/18, −xy/36, y²/18.
-        let [xx, xy, yy] = [xx + x * x / 18.0, xy - x * y / 36.0, yy + y * y / 18.0];
-        let determinant = xx * yy - xy * xy;
-        let area = 0.5 * (x * y).abs();
-        // From −3 to −1.
-        let height = 2.0 * area / (2.0 * PI * determinant.sqrt());
-        Self {
-            sign,
-            ln_height: height.ln(),
-            middle: [x, y].map(|side| side / 3.0),
-            inverse: [yy, -xy, xx].map(|entry| entry / determinant),
-        }
-    }
-
-    /// Returns its relative derivative along the change to `other` in a step. The coefficients are those of 1, x, y,
-    /// x², xy and y² at a distance (x, y) from the centre.
-    fn towards(&self, other: &Self, step: f64) -> [f32; 6] {
-        let by = |from: f64, to: f64| (to - from) / step;
-        let [x, y] = [0, 1].map(|i| by(self.middle[i], other.middle[i]));
-        let [xx, xy, yy] = self.inverse;
-        let [by_xx, by_xy, by_yy] = [0, 1, 2].map(|i| by(self.inverse[i], other.inverse[i]));
-        [
-            by(self.ln_height, other.ln_height),
-            xx * x + xy * y,
-            xy * x + yy * y,
-            -0.5 * by_xx,
-            -by_xy,
-            -0.5 * by_yy,
-        ]
-        .map(|coefficient| coefficient as f32)
-    }
-}
-
-/// Number of parameters that a triangle depends on, besides the distances from the edges.
-pub(crate) const TRIANGLE_PARAMS: usize = 5;
-
-/// An [`Overlap`] with its derivatives, for many pixels.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Triangle {
-    height: f32,
-    middle: [f32; 2],
-    inverse: [f32; 3],
-    by: [[f32; 6]; TRIANGLE_PARAMS],
-}
-
-impl Triangle {
-    /// Creates it from the triangles after a step in each parameter.
-    pub(crate) fn new(here: Overlap, there: [Overlap; TRIANGLE_PARAMS], step: f64) -> Self {
-        Self {
-            height: (here.sign * here.ln_height.exp()) as f32,
-            middle: here.middle.map(|c| c as f32),
-            inverse: here.inverse.map(|c| c as f32),
-            by: there.map(|there| here.towards(&there, step)),
-        }
-    }
-}
-
-/// Three edges that do not meet in a point, with the triangle between them.
+/// Three displaced edges, with the triangle between them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Inked<P> {
-    /// The edges.
+    /// The edges without the triangle.
     pub edges: P,
-    /// The triangle between them.
-    pub triangle: Triangle,
+    /// The pairs of edges.
+    pub pairs: [Orthant<6>; PAIRS.len()],
+    /// 1 if areas of f = −1 have grown, −1 if they have shrunk.
+    pub sign: f32,
+    /// 1/√(1 + w²/3) for half of the motion w across each edge: motion widens the blur.
+    pub narrower: [f32; 3],
 }
 
-impl<const K: usize, P: Pattern<K>> Pattern<K> for Inked<P> {
+impl<P: Pattern<3>> Pattern<3> for Inked<P> {
+    const CORRELATED: usize = PAIRS.len();
+
     #[inline(always)]
-    fn at(&self, h: [f32; K]) -> Shade<K> {
-        let Triangle { height, middle, inverse: [xx, xy, yy], by } = self.triangle;
+    fn at(&self, h: [f32; 3]) -> Shade<3> {
         let mut shade = self.edges.at(h);
-        let (x, y) = (h[0] - middle[0], h[1] - middle[1]);
-        let (by_x, by_y) = (xx * x + xy * y, xy * x + yy * y);
-        let here = height * exp_negative(-0.5 * (x * by_x + y * by_y));
-        shade.f += here;
-        shade.slopes[0] -= here * by_x;
-        shade.slopes[1] -= here * by_y;
-        for (part, [c, cx, cy, cxx, cxy, cyy]) in shade.triangle.iter_mut().zip(by) {
-            *part = here * (c + x * (cx + cxx * x + cxy * y) + y * (cy + cyy * y));
+        let weight = 0.5 * self.sign;
+        shade.f += weight;
+        for p in 0..PAIRS.len() {
+            let [i, j] = PAIRS[p];
+            // Signs of the triangle's sides: − + −, or + − +.
+            let weight = if p == 1 { weight } else { -weight };
+            let both = self.pairs[p].checker([h[i] * self.narrower[i], h[j] * self.narrower[j]]);
+            shade.f += weight * both.f;
+            shade.slopes[i] += weight * both.slopes[0] * self.narrower[i];
+            shade.slopes[j] += weight * both.slopes[1] * self.narrower[j];
+            shade.correlations[p] = weight * both.correlations[0];
         }
         shade
+    }
+}
+
+/// Two edges whose halves are displaced in opposite directions.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Parted<P> {
+    /// The pattern without displacement.
+    pub edges: P,
+    /// Displacements of the edges into areas of f = 1, in units of the blur.
+    pub by: [f32; 2],
+}
+
+impl<P: Pattern<2>> Pattern<2> for Parted<P> {
+    const CORRELATED: usize = 1;
+
+    #[inline(always)]
+    fn at(&self, h: [f32; 2]) -> Shade<2> {
+        let [d1, d2] = self.by;
+        let sign = if d1 + d2 < 0.0 { -1.0 } else { 1.0 };
+        let ahead = self.edges.at([h[0] + d1, h[1] + sign * d2]);
+        let behind = self.edges.at([h[0] - d1, h[1] - sign * d2]);
+        let (mut f, mut slopes) = (0.5 * (ahead.f + behind.f), mean(ahead.slopes, behind.slopes));
+        let mut shifts = [
+            0.5 * (ahead.slopes[0] - behind.slopes[0]),
+            0.5 * sign * (ahead.slopes[1] - behind.slopes[1]),
+        ];
+        for k in 0..2 {
+            let [there, back] = [h[k] + self.by[k], h[k] - self.by[k]];
+            let [steep, flat] = [SLOPE * bell(there), SLOPE * bell(back)];
+            f -= 0.5 * (erf_sqrt_half(there) - erf_sqrt_half(back));
+            slopes[k] -= 0.5 * (steep - flat);
+            shifts[k] -= 0.5 * (steep + flat);
+        }
+        let correlation = 0.5 * (ahead.correlations[0] + behind.correlations[0]);
+        Shade { f, slopes, correlations: [correlation, 0.0, 0.0], shifts, ..ahead }
     }
 }
 
@@ -257,6 +247,8 @@ impl SweptDeltille {
 }
 
 impl Pattern<3> for SweptDeltille {
+    const CORRELATED: usize = 0;
+
     #[inline(always)]
     fn at(&self, h: [f32; 3]) -> Shade<3> {
         let [f1, slope1, way1] = self.edge(0, h[0]);
@@ -265,9 +257,9 @@ impl Pattern<3> for SweptDeltille {
         Shade {
             f: f1 - f2 + f3,
             slopes: [slope1, -slope2, slope3],
-            correlation: 0.0,
+            correlations: [0.0; PAIRS.len()],
             halo: 0.0,
-            triangle: [0.0; TRIANGLE_PARAMS],
+            shifts: [0.0; 3],
             way: [way1, -way2, way3],
         }
     }
@@ -287,6 +279,8 @@ pub(crate) struct SweptChecker<P> {
 pub(crate) const PLACES_OF_FOUR: f64 = 15.0 / 16.0;
 
 impl<P: Pattern<2>> Pattern<2> for SweptChecker<P> {
+    const CORRELATED: usize = 1;
+
     #[inline(always)]
     fn at(&self, h: [f32; 2]) -> Shade<2> {
         // The centres of four equal parts.
@@ -294,7 +288,8 @@ impl<P: Pattern<2>> Pattern<2> for SweptChecker<P> {
         Shade {
             f: 0.5 * (outer.f + inner.f),
             slopes: mean(outer.slopes, inner.slopes),
-            correlation: 0.5 * (outer.correlation + inner.correlation),
+            correlations: mean(outer.correlations, inner.correlations),
+            shifts: mean(outer.shifts, inner.shifts),
             way: mean(outer.way, inner.way),
             ..outer
         }
@@ -311,7 +306,8 @@ impl<P: Pattern<2>> SweptChecker<P> {
         Shade {
             f: 0.5 * (behind.f + ahead.f),
             slopes: mean(behind.slopes, ahead.slopes),
-            correlation: 0.5 * (behind.correlation + ahead.correlation),
+            correlations: mean(behind.correlations, ahead.correlations),
+            shifts: mean(behind.shifts, ahead.shifts),
             way: [
                 0.5 * part * (ahead.slopes[0] - behind.slopes[0]),
                 0.5 * part * (ahead.slopes[1] - behind.slopes[1]),
@@ -322,8 +318,8 @@ impl<P: Pattern<2>> SweptChecker<P> {
 }
 
 #[inline(always)]
-fn mean(a: [f32; 2], b: [f32; 2]) -> [f32; 2] {
-    [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])]
+fn mean<const N: usize>(a: [f32; N], b: [f32; N]) -> [f32; N] {
+    std::array::from_fn(|i| 0.5 * (a[i] + b[i]))
 }
 
 #[inline(always)]
@@ -331,9 +327,9 @@ fn deltille([h1, h2, h3]: [f32; 3]) -> Shade<3> {
     Shade {
         f: erf_sqrt_half(h1) - erf_sqrt_half(h2) + erf_sqrt_half(h3),
         slopes: [SLOPE * bell(h1), -SLOPE * bell(h2), SLOPE * bell(h3)],
-        correlation: 0.0,
+        correlations: [0.0; PAIRS.len()],
         halo: 0.0,
-        triangle: [0.0; TRIANGLE_PARAMS],
+        shifts: [0.0; 3],
         way: [0.0; 3],
     }
 }
@@ -391,9 +387,9 @@ impl<const NODES: usize> Orthant<NODES> {
                 SLOPE * bell(h1) * erf_sqrt_half(towards_1 / self.sine),
                 SLOPE * bell(h2) * erf_sqrt_half(towards_2 / self.sine),
             ],
-            correlation: FRAC_2_PI / self.sine * exp_negative(exponent),
+            correlations: [FRAC_2_PI / self.sine * exp_negative(exponent), 0.0, 0.0],
             halo: 0.0,
-            triangle: [0.0; TRIANGLE_PARAMS],
+            shifts: [0.0; 2],
             way: [0.0; 2],
         }
     }
@@ -478,7 +474,7 @@ mod tests {
             }
             let (up, down) = (Orthant::new(rho + 0.01), Orthant::new(rho - 0.01));
             let quotient = (up.checker(h).f - down.checker(h).f) / 0.02;
-            let derivative = orthant.checker(h).correlation;
+            let derivative = orthant.checker(h).correlations[0];
             assert!((derivative - quotient).abs() < 5e-3 * derivative.abs().max(0.1));
         }
     }
@@ -516,6 +512,73 @@ mod tests {
             let units = |v: [f32; 2]| [v[0] / spread[0], v[1] / spread[1]];
             let four = SweptChecker { pattern, way: units(way) }.at(units(h)).f;
             assert!((four - two).abs() < 2e-3, "{h:?} {way:?}: {four} or {two}");
+        }
+    }
+
+    /// Integrates displaced edges over a Gaussian blur, and compares them with the patterns and their derivatives.
+    #[test]
+    fn displaced_edges_are_means_over_the_blur() {
+        const STEPS: i32 = 160;
+        let node = |i: i32| (f64::from(i) + 0.5) * 10.0 / f64::from(STEPS) - 5.0;
+        let mean = |of: &dyn Fn([f64; 2]) -> f64| {
+            let (mut sum, mut total) = (0.0, 0.0);
+            for i in 0..STEPS * STEPS {
+                let z = [node(i % STEPS), node(i / STEPS)];
+                let weight = (-0.5 * (z[0] * z[0] + z[1] * z[1])).exp();
+                sum += weight * of(z);
+                total += weight;
+            }
+            sum / total
+        };
+        for case in 0..60 {
+            let angles = [0.3, 1.2 + 0.01 * f64::from(case % 7), 2.3];
+            let normals = angles.map(|angle: f64| [-angle.sin(), angle.cos()]);
+            let rho =
+                |i: usize, j: usize| normals[i][0] * normals[j][0] + normals[i][1] * normals[j][1];
+            let place = [f64::from(case % 10) * 0.5 - 2.2, f64::from(case / 6) * 0.5 - 2.4];
+            let far = |k: usize, z: [f64; 2]| {
+                (place[0] + z[0]) * normals[k][0] + (place[1] + z[1]) * normals[k][1]
+            };
+            let h = [0, 1, 2].map(|k| far(k, [0.0; 2]));
+            let sign = if case % 2 == 0 { 1.0 } else { -1.0 };
+            let by: [f64; 2] = [1.1 * sign, 0.7 * sign];
+            // Areas of f = −1 are grown, or those of f = 1.
+            let two = mean(&|z| {
+                let [a, b] = [far(0, z), far(1, z)];
+                let grown = |x: f64, y: f64| x > -by[0].abs() && y > -by[1].abs();
+                match sign > 0.0 {
+                    true if grown(a, -b) || grown(-a, b) => -1.0,
+                    true => 1.0,
+                    false if grown(a, b) || grown(-a, -b) => 1.0,
+                    false => -1.0,
+                }
+            });
+            let parted =
+                |h: [f32; 2], by: [f32; 2]| Parted { edges: Orthant::new(rho(0, 1)), by }.at(h);
+            let (h2, by2) = ([h[0] as f32, h[1] as f32], by.map(|by| by as f32));
+            let found = parted(h2, by2);
+            assert!((f64::from(found.f) - two).abs() < 4e-3, "{case}: {} or {two}", found.f);
+            for k in 0..2 {
+                let step = |to: [f32; 2], s: f32| {
+                    std::array::from_fn(|j| if j == k { to[j] + s } else { to[j] })
+                };
+                let by_h = (parted(step(h2, 0.01), by2).f - parted(step(h2, -0.01), by2).f) / 0.02;
+                let by_d = (parted(h2, step(by2, 0.01)).f - parted(h2, step(by2, -0.01)).f) / 0.02;
+                assert!((by_h - found.slopes[k]).abs() < 3e-4, "{case}: {by_h}");
+                assert!((by_d - found.shifts[k]).abs() < 3e-4, "{case}: {by_d}");
+            }
+            let off = [1.1 * sign, -0.8 * sign, 0.9 * sign];
+            let three = mean(&|z| {
+                let sum: f64 = [0, 1, 2]
+                    .map(|k| (far(k, z) - off[k]).signum() * if k == 1 { -1.0 } else { 1.0 })
+                    .iter()
+                    .sum();
+                sum.clamp(-1.0, 1.0)
+            });
+            let pairs = PAIRS.map(|[i, j]| Orthant::new(rho(i, j)));
+            let inked = Inked { edges: Deltille, pairs, sign: sign as f32, narrower: [1.0; 3] };
+            let found = inked.at([0, 1, 2].map(|k| (h[k] - off[k]) as f32)).f;
+            assert!((f64::from(found) - three).abs() < 4e-3, "{case}: {found} or {three}");
         }
     }
 

@@ -14,6 +14,7 @@ pub(crate) mod blurred_corner;
 pub(crate) mod clearance;
 pub(crate) mod corner_start;
 pub(crate) mod correlation;
+pub(crate) mod edge_shift;
 pub(crate) mod joint_fit;
 pub(crate) mod model;
 pub(crate) mod optics;

@@ -137,6 +137,21 @@ impl Optics {
         Self { is_ink_open: ink.is_none(), ink: ink.unwrap_or(0.0) / INK_UNIT, ..self }
     }
 
+    /// Returns these optics with a first estimate of an unknown ink spread, in edges.
+    pub(crate) fn with_ink_near(self, ink: f64) -> Self {
+        Self { ink: ink / INK_UNIT, ..self }
+    }
+
+    /// Returns the ink spread, in edges.
+    pub(crate) fn ink(&self) -> f64 {
+        INK_UNIT * self.ink
+    }
+
+    /// Returns whether the ink spread is unknown.
+    pub(crate) fn is_ink_open(&self) -> bool {
+        self.is_ink_open
+    }
+
     /// Returns these optics with the ink spread treated as known; an unknown ink spread counts as
     /// zero.
     pub(crate) fn with_ink_as_known(self) -> Self {

@@ -79,7 +79,7 @@ pub(crate) struct Level<'a> {
     /// Image of this level.
     pub image: ImageView<'a>,
     /// Number of finer levels.
-    pub number: usize,
+    pub enlarged: usize,
     /// The coarser levels, finest first.
     pub coarser: &'a [Gray<i16>],
 }
@@ -100,7 +100,7 @@ impl Refiner {
     pub(crate) fn optics(
         &self,
         fitter: &mut CornerFitter,
-        Level { image, number, .. }: Level,
+        Level { image, enlarged, .. }: Level,
         grids: &[Grid],
         blurs: &[Option<f64>],
         tags: &TagAreas,
@@ -109,7 +109,7 @@ impl Refiner {
         if self.method() == Refinement::Polynomial {
             return known;
         }
-        if number > 0 {
+        if enlarged > 0 {
             // The blur of an enlarged image is not Gaussian, which an ink spread would explain.
             known = known.with_ink_as_known();
         }

@@ -229,6 +229,16 @@ impl Refiner {
         Self { known: self.known.with_ink(ink), ..self }
     }
 
+    /// Returns this refiner for an image in which an unknown ink spread is near this value, in edges of a tile.
+    pub(crate) fn with_ink_near(&self, ink: f64) -> Self {
+        Self { known: self.known.clone().with_ink_near(ink), ..self.clone() }
+    }
+
+    /// Returns whether the ink spread is unknown.
+    pub(crate) fn is_ink_open(&self) -> bool {
+        self.known.is_ink_open()
+    }
+
     /// Refines the corner near `start`, in the whole window.
     ///
     /// An unknown tone curve is estimated from this corner; [`Self::refine_all`] uses all corners of an image.

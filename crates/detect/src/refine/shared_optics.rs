@@ -52,11 +52,9 @@ impl Optics {
         let residuals = samples.iter().map(|sample| sample.residual).collect();
         let plain_residual = median(residuals).unwrap_or(0.0);
         let known = Self { range, plain_residual, ..known.clone() };
-        // Ink spread does not displace corners of two edges.
-        let has_ink = known.is_ink_open && K == 3;
         let is_active = |p: usize| match p {
             0..TONE_PARAMS => known.is_open,
-            INK => has_ink,
+            INK => known.is_ink_open,
             _ => true,
         };
         let members = samples.into_iter().map(Member::from).collect();

@@ -6,7 +6,7 @@ use super::corner::{AMPLITUDE, ANGLE, Corner, LEVEL, LN_BLUR, PARAMS, SLOPE, X, 
 use super::look::Look;
 use super::window::{MAX_PIXELS, Window};
 use crate::refine::blurred_corner::{
-    Deltille, FEW_NODES_RHO, Inked, Orthant, Pattern, Shade, SweptChecker, SweptDeltille, Triangle,
+    Deltille, FEW_NODES_RHO, Orthant, PAIRS, Pattern, Shade, SweptChecker, SweptDeltille,
 };
 use deltille_core::detection::TONE_PARAMS;
 
@@ -41,39 +41,21 @@ pub(super) fn fill_columns<const K: usize, const JOINT: bool>(
 ) {
     // Dispatches on constants first: branches that they exclude are not compiled.
     if K == 2 {
-        let is_square = look.rho.abs() <= FEW_NODES_RHO;
-        match (look.way, is_square) {
-            (Some(way), true) => {
-                let (still, way) = (Orthant::of_few_nodes(look.rho), [way[0], way[1]]);
-                fill_swept_checker::<K, JOINT, 3>(
-                    columns, pixels, window, corner, look, still, way,
-                );
-            }
-            (Some(way), false) => {
-                let (still, way) = (Orthant::new(look.rho), [way[0], way[1]]);
-                fill_swept_checker::<K, JOINT, 6>(
-                    columns, pixels, window, corner, look, still, way,
-                );
-            }
-            (None, true) => {
-                fill_square::<K, JOINT>(columns, pixels, window, corner, look);
-            }
-            (None, false) => {
-                fill_checker::<K, JOINT>(columns, pixels, window, corner, look);
-            }
+        let is_square = look.correlations[0].rho.abs() <= FEW_NODES_RHO;
+        match (look.way.is_some() || look.is_inked() || JOINT, is_square) {
+            (true, true) => fill_any_square::<K, JOINT>(columns, pixels, window, corner, look),
+            (true, false) => fill_any_checker::<K, JOINT>(columns, pixels, window, corner, look),
+            (false, true) => fill_square::<K, JOINT>(columns, pixels, window, corner, look),
+            (false, false) => fill_checker::<K, JOINT>(columns, pixels, window, corner, look),
         }
     } else {
-        match (look.way, look.triangle) {
+        match (look.way, look.is_inked()) {
             (Some(way), _) => {
                 let way = std::array::from_fn(|k| way.get(k).copied().unwrap_or(0.0));
                 fill_swept_deltille::<K, JOINT>(columns, pixels, window, corner, look, way);
             }
-            (None, Some(triangle)) => {
-                fill_inked_deltille::<K, JOINT>(columns, pixels, window, corner, look, triangle);
-            }
-            (None, None) => {
-                fill_deltille::<K, JOINT>(columns, pixels, window, corner, look);
-            }
+            (None, true) => fill_inked_deltille::<K, JOINT>(columns, pixels, window, corner, look),
+            (None, false) => fill_deltille::<K, JOINT>(columns, pixels, window, corner, look),
         }
     }
 }
@@ -86,11 +68,11 @@ fn fill_checker<const C: usize, const JOINT: bool>(
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
-    let still = Orthant::new(look.rho);
-    if JOINT || look.has_halo() {
-        fill::<2, C, JOINT>(columns, pixels, window, corner, look, look.haloed(still));
+    let still = Orthant::new(look.correlations[0].rho);
+    if look.has_halo() {
+        fill::<2, C, JOINT, _>(columns, pixels, window, corner, look, look.haloed(still));
     } else {
-        fill::<2, C, JOINT>(columns, pixels, window, corner, look, still);
+        fill::<2, C, JOINT, _>(columns, pixels, window, corner, look, still);
     }
 }
 
@@ -102,11 +84,66 @@ fn fill_square<const C: usize, const JOINT: bool>(
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
-    let still = Orthant::of_few_nodes(look.rho);
-    if JOINT || look.has_halo() {
-        fill::<2, C, JOINT>(columns, pixels, window, corner, look, look.haloed(still));
+    let still = Orthant::of_few_nodes(look.correlations[0].rho);
+    if look.has_halo() {
+        fill::<2, C, JOINT, _>(columns, pixels, window, corner, look, look.haloed(still));
     } else {
-        fill::<2, C, JOINT>(columns, pixels, window, corner, look, still);
+        fill::<2, C, JOINT, _>(columns, pixels, window, corner, look, still);
+    }
+}
+
+/// Two edges with motion, ink and a halo, each of which may be zero.
+#[multiversion(targets("x86_64+avx2"))]
+fn fill_any_checker<const C: usize, const JOINT: bool>(
+    columns: &mut Columns,
+    pixels: &[f32; MAX_PIXELS],
+    window: &Window,
+    corner: &Corner<C>,
+    look: &Look<C>,
+) {
+    let still = Orthant::new(look.correlations[0].rho);
+    fill_any::<C, JOINT, 6>(columns, pixels, window, corner, look, still);
+}
+
+/// The same for edges that are nearly square.
+#[multiversion(targets("x86_64+avx2"))]
+fn fill_any_square<const C: usize, const JOINT: bool>(
+    columns: &mut Columns,
+    pixels: &[f32; MAX_PIXELS],
+    window: &Window,
+    corner: &Corner<C>,
+    look: &Look<C>,
+) {
+    let still = Orthant::of_few_nodes(look.correlations[0].rho);
+    fill_any::<C, JOINT, 3>(columns, pixels, window, corner, look, still);
+}
+
+#[inline(always)]
+fn fill_any<const C: usize, const JOINT: bool, const NODES: usize>(
+    columns: &mut Columns,
+    pixels: &[f32; MAX_PIXELS],
+    window: &Window,
+    corner: &Corner<C>,
+    look: &Look<C>,
+    still: Orthant<NODES>,
+) {
+    let has_halo = JOINT || look.has_halo();
+    let Some(way) = look.way.map(|way| [way[0], way[1]]) else {
+        if has_halo {
+            let pattern = look.haloed_of(|by| look.parted(still, by));
+            fill::<2, C, JOINT, _>(columns, pixels, window, corner, look, pattern);
+        } else {
+            let pattern = look.parted(still, 1.0);
+            fill::<2, C, JOINT, _>(columns, pixels, window, corner, look, pattern);
+        }
+        return;
+    };
+    let swept =
+        |by: f32| SweptChecker { pattern: look.parted(still, by), way: [way[0] * by, way[1] * by] };
+    if has_halo {
+        fill::<2, C, JOINT, _>(columns, pixels, window, corner, look, look.haloed_of(swept));
+    } else {
+        fill::<2, C, JOINT, _>(columns, pixels, window, corner, look, swept(1.0));
     }
 }
 
@@ -120,9 +157,9 @@ fn fill_deltille<const C: usize, const JOINT: bool>(
 ) {
     let still = Deltille;
     if JOINT || look.has_halo() {
-        fill::<3, C, JOINT>(columns, pixels, window, corner, look, look.haloed(still));
+        fill::<3, C, JOINT, _>(columns, pixels, window, corner, look, look.haloed(still));
     } else {
-        fill::<3, C, JOINT>(columns, pixels, window, corner, look, still);
+        fill::<3, C, JOINT, _>(columns, pixels, window, corner, look, still);
     }
 }
 
@@ -133,32 +170,12 @@ fn fill_inked_deltille<const C: usize, const JOINT: bool>(
     window: &Window,
     corner: &Corner<C>,
     look: &Look<C>,
-    triangle: Triangle,
 ) {
+    let inked = look.inked(Deltille);
     if JOINT || look.has_halo() {
-        let pattern = Inked { edges: look.haloed(Deltille), triangle };
-        fill::<3, C, JOINT>(columns, pixels, window, corner, look, pattern);
+        fill::<3, C, JOINT, _>(columns, pixels, window, corner, look, look.haloed(inked));
     } else {
-        let pattern = Inked { edges: Deltille, triangle };
-        fill::<3, C, JOINT>(columns, pixels, window, corner, look, pattern);
-    }
-}
-
-#[multiversion(targets("x86_64+avx2"))]
-fn fill_swept_checker<const C: usize, const JOINT: bool, const NODES: usize>(
-    columns: &mut Columns,
-    pixels: &[f32; MAX_PIXELS],
-    window: &Window,
-    corner: &Corner<C>,
-    look: &Look<C>,
-    still: Orthant<NODES>,
-    [across, along]: [f32; 2],
-) {
-    let swept = |by: f32| SweptChecker { pattern: still, way: [across * by, along * by] };
-    if JOINT || look.has_halo() {
-        fill::<2, C, JOINT>(columns, pixels, window, corner, look, look.haloed_of(swept));
-    } else {
-        fill::<2, C, JOINT>(columns, pixels, window, corner, look, swept(1.0));
+        fill::<3, C, JOINT, _>(columns, pixels, window, corner, look, inked);
     }
 }
 
@@ -172,25 +189,25 @@ fn fill_swept_deltille<const C: usize, const JOINT: bool>(
     way: [f32; 3],
 ) {
     let swept = |by: f32| SweptDeltille::new(way.map(|way| way * by));
-    if let Some(triangle) = look.triangle {
-        let pattern = Inked { edges: look.haloed_of(swept), triangle };
-        fill::<3, C, JOINT>(columns, pixels, window, corner, look, pattern);
+    if look.is_inked() {
+        let pattern = look.inked(look.haloed_of(swept));
+        fill::<3, C, JOINT, _>(columns, pixels, window, corner, look, pattern);
     } else if JOINT || look.has_halo() {
-        fill::<3, C, JOINT>(columns, pixels, window, corner, look, look.haloed_of(swept));
+        fill::<3, C, JOINT, _>(columns, pixels, window, corner, look, look.haloed_of(swept));
     } else {
-        fill::<3, C, JOINT>(columns, pixels, window, corner, look, swept(1.0));
+        fill::<3, C, JOINT, _>(columns, pixels, window, corner, look, swept(1.0));
     }
 }
 
 /// Fills the columns of derivatives and residuals.
 #[inline(always)]
-fn fill<const K: usize, const C: usize, const JOINT: bool>(
+fn fill<const K: usize, const C: usize, const JOINT: bool, P: Pattern<K>>(
     columns: &mut Columns,
     pixels: &[f32; MAX_PIXELS],
     window: &Window,
     corner: &Corner<C>,
     look: &Look<C>,
-    pattern: impl Pattern<K>,
+    pattern: P,
 ) {
     let [x, y] = corner.position.as_vec2().to_array();
     // Directions of the edges, in units of the blur across them.
@@ -199,15 +216,26 @@ fn fill<const K: usize, const C: usize, const JOINT: bool>(
         std::array::from_fn(|k| (look.rotations[k].1 * look.sharpness[k]) as f32);
     let bends: [f32; K] = std::array::from_fn(|k| (corner.bends[k] / look.sharpness[k]) as f32);
     let by_turn: [f32; K] = std::array::from_fn(|k| look.by_turn[k] as f32);
-    let by_angle: [f32; K] =
-        std::array::from_fn(|k| look.rho_by_angle.get(k).map_or(0.0, |&by| by as f32));
+    // Derivatives of the correlations that the pattern depends on, with respect to each angle.
+    let mut rho_by_angle = [[0.0f32; K]; PAIRS.len()];
+    for (by_angle, (pair, of)) in rho_by_angle.iter_mut().zip(PAIRS.iter().zip(&look.correlations))
+    {
+        for (edge, by) in pair.iter().zip(of.by_angle) {
+            if let Some(here) = by_angle.get_mut(*edge) {
+                *here = by as f32;
+            }
+        }
+    }
     let by_astigmatism: [[f32; K]; 2] =
         [0, 1].map(|e| std::array::from_fn(|k| look.by_astigmatism[e][k] as f32));
-    let rho_by_astigmatism = look.rho_by_astigmatism.map(|by| by as f32);
+    let rho_by_astigmatism = look.correlations.map(|of| of.by_astigmatism.map(|by| by as f32));
     let way_by_turn: [f32; K] = std::array::from_fn(|k| look.way_by_turn[k] as f32);
     let way_by_astigmatism: [[f32; K]; 2] =
         [0, 1].map(|e| std::array::from_fn(|k| look.way_by_astigmatism[e][k] as f32));
     let displaced: [f32; K] = std::array::from_fn(|k| look.displaced[k] as f32);
+    // Lines of three edges move, and halves of two edges part.
+    let moved: [f32; K] = if K == 3 { displaced } else { [0.0; K] };
+    let parted: [f32; K] = if K == 3 { [0.0; K] } else { displaced };
     let by_ink: [f32; K] = std::array::from_fn(|k| look.by_ink[k] as f32);
     let (amplitude, level) = (corner.amplitude as f32, corner.level as f32);
     let [gu, gv] = corner.slope.as_vec2().to_array();
@@ -219,9 +247,9 @@ fn fill<const K: usize, const C: usize, const JOINT: bool>(
         let (du, dv) = (u - x, v - y);
         let along: [f32; K] = std::array::from_fn(|k| cosines[k] * du + sines[k] * dv);
         let h: [f32; K] = std::array::from_fn(|k| {
-            cosines[k] * dv - sines[k] * du - 0.5 * bends[k] * along[k] * along[k] - displaced[k]
+            cosines[k] * dv - sines[k] * du - 0.5 * bends[k] * along[k] * along[k] - moved[k]
         });
-        let Shade { f, slopes, correlation, halo, triangle, way } = pattern.at(h);
+        let Shade { f, slopes, correlations, halo, shifts, way } = pattern.at(h);
         let change = gu * u + gv * v;
         let gain = 1.0 + change;
         let shade = f * gain + change * piece.ratio;
@@ -230,15 +258,20 @@ fn fill<const K: usize, const C: usize, const JOINT: bool>(
         let seen = if model > low && model < high { 1.0 } else { 0.0 };
         let by_shade = amplitude * steepness * seen;
         let light = by_shade * gain;
-        let (mut by_x, mut by_y, mut by_scale) = (0.0, 0.0, triangle[0]);
+        let (mut by_x, mut by_y, mut by_scale) = (0.0, 0.0, 0.0);
         for k in 0..K {
             let bent = bends[k] * along[k];
             by_x += slopes[k] * (sines[k] + bent * cosines[k]);
             by_y -= slopes[k] * (cosines[k] - bent * sines[k]);
-            by_scale -= slopes[k] * h[k];
+            // The derivative with respect to the logarithm of the blur across this edge, with opposite sign.
+            let narrowed =
+                if K == 3 { slopes[k] * h[k] } else { slopes[k] * h[k] + shifts[k] * parted[k] };
+            by_scale -= narrowed;
             let across = cosines[k] * dv - sines[k] * du;
-            let turned = along[k] + bent * across + h[k] * by_turn[k];
-            let by = correlation * by_angle[k] - slopes[k] * turned + triangle[1 + k];
+            let mut by = -slopes[k] * (along[k] + bent * across) - narrowed * by_turn[k];
+            for p in 0..P::CORRELATED {
+                by += correlations[p] * rho_by_angle[p][k];
+            }
             let by = by + way[k] * way_by_turn[k];
             columns[ANGLE + k][i] = light * by;
         }
@@ -255,15 +288,18 @@ fn fill<const K: usize, const C: usize, const JOINT: bool>(
             columns[RISE][i] = amplitude * seen * (1.0 - shade * shade);
             columns[SHADE][i] = shade;
             columns[HALO][i] = light * (halo + by_scale * look.core_by_halo);
-            let mut by = triangle[4];
+            let mut by = 0.0;
             for k in 0..K {
-                by -= slopes[k] * by_ink[k];
+                by += if K == 3 { -slopes[k] } else { shifts[k] } * by_ink[k];
             }
             columns[INK][i] = light * by;
             for e in 0..2 {
-                let mut by = correlation * rho_by_astigmatism[e];
+                let mut by = 0.0;
+                for p in 0..P::CORRELATED {
+                    by += correlations[p] * rho_by_astigmatism[p][e];
+                }
                 for k in 0..K {
-                    by -= slopes[k] * h[k] * by_astigmatism[e][k];
+                    by -= (slopes[k] * h[k] + shifts[k] * parted[k]) * by_astigmatism[e][k];
                     by += way[k] * way_by_astigmatism[e][k];
                 }
                 columns[ASTIGMATISM + e][i] = light * by;
