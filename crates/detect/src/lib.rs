@@ -7,7 +7,8 @@
 //! 2. `corners` finds single corners and the edges that meet there.
 //! 3. `grid` joins corners into grids: lattice coordinates without an origin.
 //! 4. `labels` reads tags and locates each grid on the target.
-//! 5. `refine` fits the final positions and their covariances to the raw pixels.
+//! 5. `transformed` repeats the search in transformed images if no board was identified.
+//! 6. `refine` fits the final positions and their covariances to the raw pixels.
 //!
 //! [`deltille_core::detection`] defines the result.
 //!
@@ -30,6 +31,7 @@ mod recognise;
 mod refine;
 mod scene;
 mod tiling;
+mod transformed;
 
 pub use config::DetectorConfig;
 pub use deltille_core::detection::{

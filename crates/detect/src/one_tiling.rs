@@ -7,12 +7,10 @@ use super::config::DetectorConfig;
 use super::nothing_seen::nothing_found;
 use super::tiling::{CHECKER, DELTILLE, kind, step};
 use crate::corners::saddles::{SaddleFinder, too_many};
-use crate::grid::beyond::go_on;
-use crate::grid::foreshortened::foreshortened_grids;
 use crate::grid::grids::grids;
-use crate::grid::moved_edges::grids_of_moved_edges;
 use crate::grid::saddle_grid::SaddleGrid;
-use crate::grid::tile_shape::{LARGE_INK, is_of_squares};
+use crate::grid::untagged::beyond::go_on;
+use crate::grid::untagged::tile_shape::{LARGE_INK, is_of_squares};
 use crate::labels::grid_labels::{FoundGrid, Labels, MAX_CORNERS, report_once};
 use crate::labels::placement::labeller::Budget;
 use crate::refine::clearance::TagAreas;
@@ -21,6 +19,8 @@ use crate::refine::model::fitter::CornerFitter;
 use crate::refine::optics::Optics;
 use crate::refine::refine_grid::{Level, is_sampled, sharp_level};
 use crate::refine::refiner::Refiner;
+use crate::transformed::foreshortened::foreshortened_grids;
+use crate::transformed::moved_edges::grids_of_moved_edges;
 use deltille_core::Clock;
 use deltille_core::detection::{
     Detection, Grid, Ink, InkEstimate, MIN_UNTAGGED_EDGE_PX, Reason, ReasonKind,

@@ -10,26 +10,19 @@
 //! 3. `parts` joins parts on both sides of an occluder, where the map of a grid (`local_map`)
 //!    continues.
 //! 4. `grids` runs these, and removes duplicates and grids of the cells of tags.
-//! 5. `foreshortened` repeats all of it in images compressed along the tiles, for boards at a grazing angle.
-//! 6. `outline` fits an entirely visible board. `beyond` rejects untagged checkerboards whose
-//!    pattern continues beyond their end, `tile_shape` those whose tiles (`checker_tiles`) are not
-//!    squares.
+//! 5. `outline` fits a visible board. `untagged` distinguishes boards without tags from other patterns.
 
-pub(crate) mod beyond;
-pub(crate) mod checker_tiles;
 pub(crate) mod edge;
 pub(crate) mod edge_crossing;
 pub(crate) mod effort;
-pub(crate) mod foreshortened;
 pub(crate) mod gaps;
 pub(crate) mod grids;
 pub(crate) mod grow;
 pub(crate) mod links;
 pub(crate) mod local_map;
-pub(crate) mod moved_edges;
 pub(crate) mod neighbours;
 pub(crate) mod outline;
 pub(crate) mod parts;
 pub(crate) mod rectified;
 pub(crate) mod saddle_grid;
-pub(crate) mod tile_shape;
+pub(crate) mod untagged;

@@ -15,10 +15,10 @@
 
 use rayon::prelude::*;
 
-use super::grids::grids;
-use super::outline::WholeBoard;
-use super::saddle_grid::SaddleGrid;
 use crate::corners::saddles::{SaddleFinder, is_all_noise};
+use crate::grid::grids::grids;
+use crate::grid::outline::WholeBoard;
+use crate::grid::saddle_grid::SaddleGrid;
 use crate::levels::MIN_LEVEL_SIDE;
 use deltille_core::raster::{Gray, Pyramid};
 

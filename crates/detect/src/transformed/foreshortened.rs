@@ -16,9 +16,9 @@ use glam::DVec2;
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
-use super::grids::grids;
-use super::saddle_grid::SaddleGrid;
 use crate::corners::saddles::{SaddleFinder, is_all_noise};
+use crate::grid::grids::grids;
+use crate::grid::saddle_grid::SaddleGrid;
 use crate::levels::MIN_LEVEL_SIDE;
 use deltille_core::raster::{Gray, Pyramid};
 
