@@ -28,8 +28,9 @@ SAMPLES = 16
 WHITES = (225, 255)
 BLURS = (0.7, 1.5)
 BLACK, NOISE = 30, 1.0
-# Largest RMS error of boards with moved edges, relative to the others.
-MOST = 1.2
+# Largest RMS error of boards with moved edges: relative to the others, or as a fraction of a square if the gap at a corner
+# is so wide that corners are refined on a coarser level.
+MOST, PART = 1.2, 1.25e-4
 
 
 def profiles(count, square_px, shift, blur_px, start_px, size):
@@ -89,7 +90,7 @@ def main(program, folder):
     for square_px in SQUARES:
         still, moved = (np.sqrt(np.mean(errors[square_px, is_moved])) for is_moved in (False, True))
         print(f"squares of {square_px} px: RMS per axis {still:.4f} px without and {moved:.4f} px with moved edges")
-        assert moved < MOST * still, square_px
+        assert moved < max(MOST * still, PART * square_px), square_px
     print(f"all {len(truth)} boards were found, with edges moved by {SHIFTS[0]:.0%} to {SHIFTS[-1]:.0%} of a square")
 
 

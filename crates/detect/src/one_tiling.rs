@@ -425,7 +425,10 @@ impl OneTiling {
         let blurs = refiner.blurs(fitter, finest, grids, &self.tag_areas);
         let sharp = sharp_level(&blurs, levels.len());
         for number in (least.max(1)..=sharp.max(least)).rev() {
-            let image = ImageView::from(&levels[number]);
+            // On a level that is coarser than its sharpness requires, edges would be sharper than the pixels.
+            let smooth = (number > sharp).then(|| Pyramid::new(&levels[number], 1, 1));
+            let image = smooth.as_ref().map_or(&levels[number], |smooth| &smooth.levels()[0]);
+            let image = ImageView::from(image);
             let enlarged = if number > sharp { 0 } else { number };
             let level = Level { image, enlarged, coarser: &levels[number + 1..] };
             grids.iter_mut().for_each(|grid| grid.moved_to_level(number));
