@@ -82,7 +82,7 @@ struct Facts {
 }
 
 impl Facts {
-    /// Whether these are the properties of this model, with any number.
+    /// Whether these are the properties of this model, whatever its number of terms or knots.
     fn is_of(&self, model: Model) -> bool {
         discriminant(&self.model) == discriminant(&model)
     }

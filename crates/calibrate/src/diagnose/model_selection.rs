@@ -207,7 +207,7 @@ impl Calibration {
     }
 
     /// The smallest lens model, among those with a subset of the parameters, that fits camera
-    /// `camera` equally well as the model of `found`, according to an F test; `None` if all
+    /// `camera` as well as the model of `found`, according to an F test; `None` if all
     /// parameters are needed, or the intrinsics were given.
     pub fn sufficient_model(&self, camera: usize, found: &Estimate) -> Option<Model> {
         let (alone, found) = self.and_alone(camera, found)?;

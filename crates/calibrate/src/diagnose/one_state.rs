@@ -21,8 +21,8 @@ use crate::uncertainty::state_equations::{
 use deltille_core::camera::Camera;
 use deltille_core::statistics::f_p_value;
 
-/// Significance level of each of the three diagnoses, 1 % for all three; the level for a change
-/// covers all its positions together.
+/// Significance level of each of the three tests, so that it is 1 % for all three together. In the
+/// test for a change, it applies to the search over all k as a whole.
 const SIGNIFICANT: f64 = 0.01 / 3.0;
 
 /// Minimum number of views before and after a change: two, and one more to test them.

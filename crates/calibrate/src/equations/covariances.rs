@@ -1,4 +1,4 @@
-//! The inverse of the normal equations: covariances of all unknowns, and the undetermined ones.
+//! The inverse of the normal matrix: covariances of all unknowns, and which are undetermined.
 
 use deltille_core::damping::Damping;
 use std::collections::BTreeSet;

@@ -35,7 +35,7 @@ pub(super) struct Seen {
 /// The views of each camera, by the name of the frame.
 pub(super) type ByFrame = Vec<BTreeMap<String, Vec<Seen>>>;
 
-/// The poses of all cameras and targets that are fixed.
+/// The fixed relative poses: of all cameras in the rig, and of all targets in the scene.
 pub(super) struct Places {
     pub camera_from_rig: Vec<Pose>,
     pub scene_from_target: Vec<Pose>,

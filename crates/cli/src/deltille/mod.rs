@@ -78,6 +78,7 @@ enum Command {
     #[command(mut_arg("family", |arg| arg.help(solid::squares::FAMILY)))]
     #[command(mut_arg("tag_spacing", |arg| arg.help(solid::squares::SPACING)))]
     #[command(mut_arg("tag_border", |arg| arg.help(solid::squares::BORDER)))]
+    #[command(mut_arg("dense", |arg| arg.hide(true)), mut_arg("hole", |arg| arg.hide(true)))]
     Cube(Box<solid::Args>),
     /// Make a cuboid with tagged checkerboards on its faces
     #[command(after_help = examples::CUBOID)]
@@ -86,6 +87,7 @@ enum Command {
     #[command(mut_arg("family", |arg| arg.help(solid::squares::FAMILY)))]
     #[command(mut_arg("tag_spacing", |arg| arg.help(solid::squares::SPACING)))]
     #[command(mut_arg("tag_border", |arg| arg.help(solid::squares::BORDER)))]
+    #[command(mut_arg("dense", |arg| arg.hide(true)), mut_arg("hole", |arg| arg.hide(true)))]
     Cuboid(Box<solid::CuboidArgs>),
     /// Make a solid from any closed mesh of triangles, rectangles and other convex faces
     #[command(after_help = examples::MESH)]

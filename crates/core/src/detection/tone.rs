@@ -325,7 +325,7 @@ fn interpolated(values: [f64; TERMS]) -> [f64; TERMS] {
 mod tests {
     use super::*;
 
-    /// Compares the part of a corner with the curve itself.
+    /// Compares the piece of a tone curve between black and white at a corner with the curve.
     #[test]
     fn pieces_follow_their_curves() {
         for tone in [Tone::Gamma(1.6), Tone::Gamma(2.6), Tone::Srgb] {

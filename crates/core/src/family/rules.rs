@@ -147,8 +147,7 @@ impl Screen {
     }
 
     /// Returns whether words with this difference are far enough apart, even with hidden cells.
-    /// Rotating both words
-    /// changes nothing, as hidden cells may lie anywhere.
+    /// Rotating both words changes nothing, because the sets of hidden cells include all rotations.
     #[inline]
     pub fn is_apart(&self, difference: u64) -> bool {
         let count = difference.count_ones();

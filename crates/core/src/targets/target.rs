@@ -124,8 +124,9 @@ impl Target {
         })
     }
 
-    /// Checks that a family is one that the target names: it has the same fingerprint, or had it before it grew and
-    /// then already had all tags of the target.
+    /// Checks that a family is one that the target names: it has the
+    /// fingerprint in the target, or an earlier, shorter version of it had this fingerprint and
+    /// contained all tags of the target. Also checks that a hole fits.
     ///
     /// # Errors
     /// Returns why it is not.

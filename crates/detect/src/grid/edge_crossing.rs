@@ -20,6 +20,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::edge::MAX_CHORD_RAD;
 use super::links::MAX_CONTRAST_RATIO;
+use crate::tiling::CHECKER;
 use deltille_core::raster::ImageView;
 use deltille_core::statistics::median;
 
@@ -127,6 +128,10 @@ impl EdgeCrossing {
     /// Returns the corner near `place`, px, with these neighbours in counter-clockwise order on the print. All its edges
     /// must be visible, with dark and bright tiles in turn.
     pub(crate) fn find(image: ImageView, place: DVec2, neighbours: &[Neighbour]) -> Option<Self> {
+        if neighbours.len() != CHECKER {
+            // Six edges leave sectors of 60°. Between the faces of a net, edges of other tiles imitate them.
+            return None;
+        }
         let half = neighbours.len() / 2;
         let courses: Vec<Course> = (0..neighbours.len()).map(|k| course(neighbours, k)).collect();
         let size_px = (image.width() + image.height()) as f64;

@@ -56,7 +56,7 @@ const MIN_LEFT: f32 = 0.1;
 /// Number of corners that determine correlations; the sums of ten vary by a few per cent.
 pub(crate) const CORNERS: usize = 10;
 
-/// One in this many columns determines the part that fits remove from residuals. That part depends
+/// One corner in this many determines the part that fits remove from residuals. That part depends
 /// only on the windows and is nearly the same for all.
 const HAT_EVERY: usize = 4;
 
@@ -122,7 +122,7 @@ struct Part {
     on_position: [Vec<f32>; 2],
     /// The diagonal of H.
     diagonal: Vec<f32>,
-    /// The columns of Q, one in [`HAT_EVERY`].
+    /// The columns of Q, for one corner in [`HAT_EVERY`]; empty for the others.
     hat: Vec<Vec<f32>>,
     noise: f64,
 }

@@ -109,7 +109,7 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     let outliers = report.estimate.outlier_count();
     if outliers > 0 {
         let text = format!(
-            "{outliers} of {} corners are outliers; they are drawn in red.",
+            "Outliers, drawn in red: {outliers} of {} corners.",
             report.estimate.corner_count()
         );
         add(Weight::Hint, text);

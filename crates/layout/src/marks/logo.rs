@@ -104,7 +104,7 @@ impl Logo {
             return Err("an outline has fewer than three corners".to_owned());
         }
         if [left, upper, lower] != [0, 0, UNITS] {
-            return Err(format!("the ink must start at 0 0 and have a height of {UNITS}"));
+            return Err(format!("the outlines must begin at x = 0, y = 0 and be {UNITS} high"));
         }
         let ratio = f64::from(right) / f64::from(UNITS);
         // Coordinates are rounded, so the ratio may exceed the limit slightly.

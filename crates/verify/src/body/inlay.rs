@@ -265,8 +265,9 @@ fn not_filled(
     };
     let found = inlay.white_mm3 + inlay.black_mm3;
     let [white, black, whole] = [inlay.white_mm3, inlay.black_mm3, stated].map(|mm3| mm3 / 1e3);
-    (!same(found, stated))
-        .then(|| format!("{white:.2} cm³ white and {black:.2} cm³ black instead of {whole:.2} cm³"))
+    (!same(found, stated)).then(|| {
+        format!("{white:.2} cm³ white and {black:.2} cm³ black instead of {whole:.2} cm³ in total")
+    })
 }
 
 /// Returns the area of triangles, mm².

@@ -196,7 +196,7 @@ fn a_repeated_folder_is_reported_in_one_line() {
     let said = String::from_utf8(output(folder.path(), &command).stderr).unwrap();
     let copies: Vec<&str> = said.lines().filter(|line| line.contains("counted once")).collect();
     let [line] = copies.as_slice() else { panic!("{said}") };
-    assert!(line.contains("corners/00.json") && line.ends_with("5 more are duplicates"), "{line}");
+    assert!(line.contains("corners/00.json") && line.ends_with("5 more duplicates"), "{line}");
 }
 
 #[test]

@@ -19,7 +19,7 @@ pub fn about(of: &Family, other: &Family, result_format: ResultFormat) -> anyhow
                 bits[1]
             );
         }
-        bail!("families of more than {PAIRS_COUNTED} codes are not compared code by code");
+        bail!("cannot compare families of more than {PAIRS_COUNTED} codes");
     };
     let Confusion { direct, mirrored, .. } = &confusion;
     let within = |most: u32| [direct, mirrored].map(|all| all.range(..=most).map(|(_, n)| n).sum());

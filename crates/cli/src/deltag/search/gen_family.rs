@@ -33,9 +33,9 @@ use deltille_core::words::counted;
 
 /// Text at the end of `--help`.
 pub const HELP: &str = "Ctrl-C ends a search early. The methods best and algebraic then write the best family so far \
-    (exit code 0). --method search writes the result of its finished rounds, and lexicode writes \
-    nothing (exit code 130). With --resume, running the same command again continues the search \
-    and gives the same result as an uninterrupted run; \
+    (exit code 0). The method search writes the result of its finished rounds, and lexicode writes \
+    nothing (both with exit code 130). With --resume, running the same command again continues \
+    the search and gives the same result as an uninterrupted run; \
     with --time, it uses the remaining time. If nothing has been found yet, nothing is written \
     (130). A second Ctrl-C ends the program immediately.";
 
@@ -50,8 +50,9 @@ pub struct Args {
     /// Search method
     #[arg(long, value_enum, default_value_t = Method::Best)]
     method: Method,
-    /// Time limit in seconds; for best and algebraic, longer searches find larger families [default: 60]; the method
-    /// `search` starts no new round after this time
+    /// Time limit in seconds, for best, algebraic and search; longer searches can find larger
+    /// families. The method `search` starts no new round after this time [default: 60 for best and
+    /// algebraic, unlimited for search]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true,
           value_parser = number(0.001..=1e6))]
     time: Option<f64>,

@@ -22,9 +22,9 @@ pub struct RuleArgs {
     /// Require the distance of every code from the all-white tile to be at least that of the family
     #[arg(long)]
     reject_white: bool,
-    /// Minimum distance under erasures: apex (the 4 cells at any one corner), edge (the cells along
-    /// any one edge) or tile (any triangle of 4 cells). The distance is 3 unless given, as in
-    /// edge=5. Repeatable
+    /// Require a minimum distance even if some cells are hidden: apex (the 4 cells at any one
+    /// corner), edge (the cells along any one edge) or tile (any triangle of 4 cells). Give the
+    /// distance after an equals sign, such as edge=5 [default: 3]. Repeatable
     #[arg(long, value_name = "CELLS[=DISTANCE]")]
     robust_to: Vec<Robust>,
     /// Leave the centre cells unused, for a hole: one cell, or six with 9 and 36 bits

@@ -44,7 +44,8 @@ pub struct Args {
     /// Family file, if the target uses a family that does not ship with the program
     #[arg(long)]
     family: Option<String>,
-    /// Write a line for every image and target: without a pose, camera_from_target is null and reason explains why
+    /// Write a line for every image and target; without a pose, `camera_from_target` is null and
+    /// `reason` says why
     #[arg(long, alias = "every-picture")]
     all_images: bool,
     /// Write to a file instead of standard output

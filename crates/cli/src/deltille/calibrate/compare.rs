@@ -41,7 +41,7 @@ pub struct Args {
     /// Differences up to this RMS per axis in px do not cause exit code 1, even if significant
     #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = tolerance)]
     tolerance: f64,
-    /// Write the comparison, and a plot of each camera under the same name
+    /// Write the comparison, and an .svg plot of each camera beside it
     #[arg(short, long, value_name = "FILE.json")]
     output: Option<PathBuf>,
     /// Compare even if the calibrations used boards with the same tags but different sizes

@@ -323,7 +323,7 @@ pub fn read(
     if let Some((copy, first)) = copies.first() {
         let others = match copies.len() - 1 {
             0 => String::new(),
-            others => format!("; {others} more are duplicates"),
+            others => format!("; {}", counted(others, "more duplicate")),
         };
         let (copy, first) = (copy.display(), first.display());
         log!("warning: {copy}: duplicate of {first}, counted once{others}");

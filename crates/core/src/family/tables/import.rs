@@ -221,7 +221,7 @@ fn places(tokens: &[&str]) -> Vec<[u32; 2]> {
     places.into_iter().map(|[x, y]| [x.unwrap_or(u32::MAX), y.unwrap_or(u32::MAX)]).collect()
 }
 
-/// Reorders the bits of codes from these positions to rows.
+/// Reorders the bits of codes row by row, given the position of each bit.
 fn in_rows(
     codes: &[u64],
     places: &[[u32; 2]],

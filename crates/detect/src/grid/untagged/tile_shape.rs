@@ -40,7 +40,8 @@ pub(crate) const LARGE_INK: f64 = 0.05;
 /// Tolerance of these limits, in standard deviations, measured by waves that tiles of boards and dots do not have.
 const DEVIATIONS: f64 = 3.0;
 
-/// Number of isolated squares of the wrong colour below which they count as dirt, for any number of whole squares.
+/// Fewer isolated squares of the wrong colour than this count as dirt, whatever the number of
+/// whole squares.
 const MIN_WRONG: usize = 3;
 
 /// The same as a fraction of the whole squares.

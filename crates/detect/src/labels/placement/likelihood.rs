@@ -27,7 +27,7 @@ pub(super) struct Judged {
 /// A placement of a grid on a panel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Placement {
-    /// Index of the sight.
+    /// Index of the [`Sight`](super::sight::Sight): the readings of all tiles in one way.
     pub(super) sight: usize,
     /// Index of the panel.
     pub(super) panel: usize,

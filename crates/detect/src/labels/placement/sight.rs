@@ -121,8 +121,8 @@ fn is_word(reading: &Reading) -> bool {
     /// boards, all dirty, for one. With 8 of 10 these are 15 and 9, with 19 of 20 they are 10 and 1.
     const SURE_CELLS: [usize; 2] = [9, 10];
     /// At least one in this many cells must have the other colour, because an untagged tile has one
-    /// colour except for dirt. Fewer have it in one of 240 tiles of 16 random cells, and in one of
-    /// 1100 tiles of 25. With 3, no dirt counts as a tag, but one in 5 tags of 16 cells is missed.
+    /// colour except for dirt. A random code of 16 cells fails this test once in 240, one of 25
+    /// cells once in 1100. With 3, no dirt counts as a tag, but 1 in 5 tags of 16 cells is missed.
     const MIN_OTHER: usize = 6;
     // Free cells contain no information.
     let n = reading.half_odds.iter().filter(|odds| odds.abs() > 0.0).count();

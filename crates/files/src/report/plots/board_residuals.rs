@@ -42,7 +42,7 @@ pub(in crate::report) fn plot(
         is_confirmed: corner.is_confirmed,
         colour: colour(corner.rms_px).to_owned(),
         title: format!(
-            "row {}, column {}: rms {:.4} px, ({:.4}, {:.4}) mm, {} views",
+            "row {}, column {}: rms {:.4} px, offset ({:.4}, {:.4}) mm, {} views",
             corner.row, corner.col, corner.rms_px, corner.move_mm.x, corner.move_mm.y, corner.views
         ),
     });

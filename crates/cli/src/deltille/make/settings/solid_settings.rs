@@ -107,8 +107,8 @@ pub struct SolidSettings {
     /// Thickness of the skeleton below the panels [default: 4mm]
     #[arg(long, help_heading = BODIES, value_name = "LENGTH", allow_hyphen_values = true)]
     pub wall: Option<String>,
-    /// Distance of the seats from the edges of the faces [default: the smallest at which the ribs
-    /// have a base]
+    /// Distance of the seats from the edges of the faces [default: the smallest that leaves a
+    /// base for the ribs]
     #[arg(long, help_heading = BODIES, value_name = "LENGTH", allow_hyphen_values = true)]
     pub rib: Option<String>,
     /// Write <name>-panels.dxf, the cut outlines of all faces or, with --skeleton, of its panels;

@@ -54,7 +54,7 @@ pub struct Template<'a> {
 }
 
 impl<'a> Template<'a> {
-    /// Fails if another file would be replaced.
+    /// Fails if the path is a folder, or a file of another kind and `--force` is not given.
     pub fn new(path: &'a Path, text: String, overwrite: Overwrite) -> anyhow::Result<Self> {
         if path.is_dir() {
             bail!("--save-template: {} is a folder; expected a file", path.display());
