@@ -14,7 +14,7 @@ use crate::grid::untagged::tile_shape::{LARGE_INK, is_of_squares};
 use crate::labels::grid_labels::{FoundGrid, Labels, MAX_CORNERS, report_once};
 use crate::labels::placement::labeller::Budget;
 use crate::refine::clearance::TagAreas;
-use crate::refine::edge_shift::large_shift;
+use crate::refine::edge_shift::{has_straight_edges, large_shift};
 use crate::refine::model::fitter::CornerFitter;
 use crate::refine::optics::Optics;
 use crate::refine::refine_grid::{Level, is_sampled, sharp_level};
@@ -283,8 +283,11 @@ impl OneTiling {
         if is_sought && !grids.iter().any(is_identified) {
             let found = grids_of_moved_edges(finder, pyramid, self.labels.whole());
             let mut identified = self.plausible::<N>(frame, &found, &mut Vec::new());
-            // Halftones look like boards whose edges have moved.
-            identified.retain(is_identified);
+            // Dots look like squares whose edges have moved.
+            identified.retain(|found| {
+                is_identified(found)
+                    && (is_confirmed(&found.0) || has_straight_edges(frame.image, &found.0))
+            });
             if !identified.is_empty() {
                 grids = identified;
             }

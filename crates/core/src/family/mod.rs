@@ -11,7 +11,7 @@
 //! let decoder = Decoder::new(&family);
 //! let read = family.code(12).unwrap() ^ 0b1000_0010_0000_0001; // three cells misread
 //! let decoded = decoder.decode(read, 3).unwrap();
-//! assert_eq!((decoded.id, decoded.turns, decoded.errors), (12, 0, 3));
+//! assert_eq!((decoded.id, decoded.rotations, decoded.errors), (12, 0, 3));
 //! # Ok::<(), deltille_core::family::FamilyError>(())
 //! ```
 //!

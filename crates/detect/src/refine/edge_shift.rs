@@ -34,6 +34,10 @@ const MAX_EDGES: usize = 48;
 /// longer adjacent to their corners.
 const MAX_SHIFT: f64 = 0.3;
 
+/// Maximum median deviation of the middle of an edge from its quarters, as a fraction of its length. A disc that reaches
+/// its diagonal neighbours has 0.046.
+const MAX_BOW: f64 = 0.025;
+
 /// Number of samples across an edge, to each side.
 const SAMPLES: i32 = 24;
 
@@ -65,7 +69,21 @@ pub(crate) fn large_shift(image: ImageView, grids: &[Grid]) -> Option<EdgeShift>
     shifts.get(shifts.len() / 2).copied().filter(|shift| shift.px > MIN_SHIFT_PX)
 }
 
-fn shift_of_grid(image: ImageView, grid: &Grid) -> Option<EdgeShift> {
+/// Returns whether the edges of an untagged grid are straight. Dots that touch diagonally look like squares that have
+/// grown or shrunk, but their outlines are round.
+pub(crate) fn has_straight_edges(image: ImageView, grid: &Grid) -> bool {
+    let bow = |edge: &[DVec2; 2]| {
+        let [first, middle, last] =
+            [0.25, 0.5, 0.75].map(|part| shift_of_edge(image, *edge, part, grid.kind));
+        Some(middle? - (first? + last?) / 2.0)
+    };
+    let bows: Vec<f64> = measured_edges(grid).iter().filter_map(bow).collect();
+    let is_measured = bows.len() >= MIN_EDGES;
+    is_measured && median(bows).is_some_and(|bow| bow.abs() < MAX_BOW)
+}
+
+/// Returns edges of a grid from all over it, each from one corner to the next.
+fn measured_edges(grid: &Grid) -> Vec<[DVec2; 2]> {
     let corners: BTreeMap<Vertex, DVec2> = grid
         .corners
         .iter()
@@ -79,9 +97,14 @@ fn shift_of_grid(image: ImageView, grid: &Grid) -> Option<EdgeShift> {
         .filter_map(|(next, from)| Some([from, *corners.get(&next)?]))
         .collect();
     let every = edges.len().div_ceil(MAX_EDGES).max(1);
-    let measured = edges.iter().step_by(every);
-    let shifts: Vec<f64> =
-        measured.filter_map(|&[from, to]| shift_of_edge(image, from, to, grid.kind)).collect();
+    edges.into_iter().step_by(every).collect()
+}
+
+fn shift_of_grid(image: ImageView, grid: &Grid) -> Option<EdgeShift> {
+    let shifts: Vec<f64> = measured_edges(grid)
+        .into_iter()
+        .filter_map(|edge| shift_of_edge(image, edge, 0.5, grid.kind))
+        .collect();
     let edge_px = grid.edge_px()?;
     let is_measured = shifts.len() >= MIN_EDGES;
     let edges = median(shifts).filter(|_| is_measured)?;
@@ -89,9 +112,15 @@ fn shift_of_grid(image: ImageView, grid: &Grid) -> Option<EdgeShift> {
 }
 
 /// Returns the displacement of the step across an edge towards its bright side, as a fraction of the edge length.
-fn shift_of_edge(image: ImageView, from: DVec2, to: DVec2, kind: GridKind) -> Option<f64> {
+/// It is measured at a fraction `part` of the edge.
+fn shift_of_edge(
+    image: ImageView,
+    [from, to]: [DVec2; 2],
+    part: f64,
+    kind: GridKind,
+) -> Option<f64> {
     let along = to - from;
-    let middle = (from + to) / 2.0;
+    let middle = from + part * along;
     let across = along.perp();
     let reach = match kind {
         GridKind::Deltille => MAX_SHIFT * deltille_core::lattice::ROW_HEIGHT,
@@ -124,4 +153,57 @@ fn shift_of_edge(image: ImageView, from: DVec2, to: DVec2, kind: GridKind) -> Op
     let part = (level - profile[at - 1]) / (profile[at] - profile[at - 1]);
     let position = (at as f64 - 1.0 + part - f64::from(SAMPLES)) * reach / f64::from(SAMPLES);
     Some(if is_bright(&profile[at]) { position } else { -position })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deltille_core::detection::GridCorner;
+    use deltille_core::raster::Gray;
+
+    const EDGE_PX: usize = 30;
+
+    /// A board whose dark tiles are the points within `is_dark` of their centres, in edges, and its corners.
+    fn board(is_dark: impl Fn(f64, f64) -> bool) -> (Gray<u8>, Grid) {
+        let side = 9 * EDGE_PX;
+        let image = Gray::from_fn(side, side, |x, y| {
+            let [u, v] = [x, y].map(|c| (c as f64 + 0.5) / EDGE_PX as f64);
+            let near = |at: f64| [at.floor() - 1.0, at.floor(), at.floor() + 1.0];
+            let dark = near(u).into_iter().any(|col| {
+                near(v).into_iter().any(|row| {
+                    (col + row).rem_euclid(2.0) == 0.0 && is_dark(u - col - 0.5, v - row - 0.5)
+                })
+            });
+            if dark { 40 } else { 220 }
+        });
+        let place = |i: i32| f64::from(i) * EDGE_PX as f64 - 0.5;
+        let corners = (1..64).map(|i| (i / 8, i % 8)).filter(|(row, col)| *row > 0 && *col > 0);
+        let corners = corners.map(|(row, col)| {
+            let (id, cov) = (None, None);
+            GridCorner { row, col, id, x: place(col), y: place(row), cov }
+        });
+        let grid = Grid {
+            kind: GridKind::Checker,
+            target: None,
+            panel: None,
+            mirrored: false,
+            corners: corners.collect(),
+            tags: Vec::new(),
+        };
+        (image, grid)
+    }
+
+    #[test]
+    fn squares_are_measured_and_dots_are_not_squares() {
+        for shift in [-0.15, -0.05, 0.1] {
+            let (image, grid) = board(|u, v| u.abs().max(v.abs()) < 0.5 + shift);
+            let found = large_shift((&image).into(), &[grid.clone()]).unwrap();
+            assert!((found.edges - shift).abs() < 0.03, "{shift}: {found:?}");
+            assert!(has_straight_edges((&image).into(), &grid), "{shift}");
+        }
+        for radius in [0.6, 0.69, 0.75] {
+            let (image, grid) = board(|u, v| u.hypot(v) < radius);
+            assert!(!has_straight_edges((&image).into(), &grid), "{radius}");
+        }
+    }
 }

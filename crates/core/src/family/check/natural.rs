@@ -46,9 +46,9 @@ const TABLE: &str = include_str!("../../../families/natural/words.txt");
 /// use deltille_core::lattice::Dimension;
 ///
 /// let words = NaturalWords::new(Dimension::from_bits(9)?);
-/// let all: f64 = (0..1 << 9).map(|word| words.chance(word)).sum();
+/// let all: f64 = (0..1 << 9).map(|word| words.probability(word)).sum();
 /// assert!((all - 1.0).abs() < 0.01, "{all}");
-/// assert!(words.chance(0) > 100.0 * words.chance(0b0_1010_1010));
+/// assert!(words.probability(0) > 100.0 * words.probability(0b0_1010_1010));
 /// # Ok::<(), deltille_core::lattice::DimensionError>(())
 /// ```
 #[derive(Clone, Debug)]

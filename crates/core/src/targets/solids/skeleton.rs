@@ -329,7 +329,7 @@ mod tests {
         let thin = SkeletonSpec { rib_mm: Some(1.0), ..spec };
         assert!(
             message(Polyhedron::icosahedron(150.0), thin)
-                .contains("`SkeletonSpec::rib_mm`: 1 mm leaves no foot")
+                .contains("`SkeletonSpec::rib_mm`: 1 mm leaves no base")
         );
         assert!(
             message(Polyhedron::tetrahedron(50.0), spec).contains("a larger `SolidSpec::edge_mm`")
