@@ -162,8 +162,7 @@ impl<P: Pattern<3>> Pattern<3> for Inked<P> {
         let mut shade = self.edges.at(h);
         let weight = 0.5 * self.sign;
         shade.f += weight;
-        for p in 0..PAIRS.len() {
-            let [i, j] = PAIRS[p];
+        for (p, [i, j]) in PAIRS.into_iter().enumerate() {
             // Signs of the triangle's sides: − + −, or + − +.
             let weight = if p == 1 { weight } else { -weight };
             let both = self.pairs[p].checker([h[i] * self.narrower[i], h[j] * self.narrower[j]]);

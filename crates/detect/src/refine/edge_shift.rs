@@ -197,7 +197,7 @@ mod tests {
     fn squares_are_measured_and_dots_are_not_squares() {
         for shift in [-0.15, -0.05, 0.1] {
             let (image, grid) = board(|u, v| u.abs().max(v.abs()) < 0.5 + shift);
-            let found = large_shift((&image).into(), &[grid.clone()]).unwrap();
+            let found = large_shift((&image).into(), std::slice::from_ref(&grid)).unwrap();
             assert!((found.edges - shift).abs() < 0.03, "{shift}: {found:?}");
             assert!(has_straight_edges((&image).into(), &grid), "{shift}");
         }
