@@ -35,7 +35,7 @@ const FAR: f64 = 0.55;
 const STATIONS: usize = 8;
 
 /// Number of stations of an edge at which it must be visible.
-const LEAST_STATIONS: usize = 6;
+const MIN_STATIONS: usize = 6;
 
 /// Distance of the samples on either side of the edge, as a fraction of the height of its tiles: within the border of
 /// a tag, like the samples that join corners.
@@ -174,7 +174,7 @@ impl EdgeCrossing {
         for (k, edge) in found.iter().enumerate() {
             let is_visible = |peak: &Peak| MAX_CONTRAST_RATIO * peak.step >= usual;
             let visible: Vec<_> = edge.iter().filter(|(_, peak)| is_visible(peak)).collect();
-            if visible.len() < LEAST_STATIONS {
+            if visible.len() < MIN_STATIONS {
                 return None;
             }
             let side = if k < half { 1.0 } else { -1.0 };

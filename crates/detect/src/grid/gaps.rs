@@ -11,10 +11,11 @@ use super::links::{facing_ray, have_similar_contrast};
 use super::local_map::{Bend, LocalMap};
 use super::rectified::Rectified;
 use super::saddle_grid::{Growing, GrownSaddle};
+use super::untagged::checker_tiles::parity;
 use crate::corners::saddles::{Saddle, SaddleFinder};
 use crate::corners::sectors::{Sectors, turn};
-use crate::tiling::{kind, neighbours, step};
-use deltille_core::lattice::{GridKind, Vertex};
+use crate::tiling::{neighbours, step};
+use deltille_core::lattice::Vertex;
 use deltille_core::raster::Pyramid;
 
 /// Maximum distance of a missing corner from its predicted position, as a fraction of the edge length there.
@@ -140,7 +141,7 @@ fn corner_near<const N: usize>(
     found.or_else(|| meeting(position))
 }
 
-/// Returns the corner in which the edges to the neighbours of a vertex meet, on a level of the pyramid. All its edges must
+/// Returns the corner of a checkerboard in which the edges to the neighbours of a vertex meet, on a level of the pyramid. All its edges must
 /// be visible, with the colours and the contrast of the neighbours.
 fn met_by_edges<const N: usize>(
     pyramid: &Pyramid,
@@ -160,10 +161,7 @@ fn met_by_edges<const N: usize>(
     let beside: [Neighbour; N] = std::array::from_fn(beside);
     let met = EdgeCrossing::find((&pyramid.levels()[level]).into(), on_level(position), &beside)?;
     // Even rays have the dark side on their left.
-    let turn = match kind::<N>() {
-        GridKind::Deltille => 0,
-        GridKind::Checker => (vertex.row + vertex.col).rem_euclid(2) as usize,
-    };
+    let turn = parity(vertex);
     let rays = std::array::from_fn(|ray| met.rays[(ray + turn) % N]);
     let sectors = Sectors { rays, level: met.level, amplitude: met.amplitude };
     let saddle = Saddle { position: Pyramid::to_level_0(level, met.position), sectors, level };

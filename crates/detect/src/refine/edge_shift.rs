@@ -4,6 +4,8 @@
 //! from dark to bright across the line is displaced there by the shift of the edges. The model of the corners starts
 //! from this value if it is larger than its range of convergence.
 
+use std::collections::BTreeMap;
+
 use glam::DVec2;
 
 use super::shared_optics::REACH_PX;
@@ -11,7 +13,6 @@ use deltille_core::detection::Grid;
 use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::raster::ImageView;
 use deltille_core::statistics::median;
-use std::collections::BTreeMap;
 
 /// Shift below which the model converges from zero, px: less than one blur.
 const MIN_SHIFT_PX: f64 = 0.5;

@@ -35,13 +35,11 @@ pub(crate) fn grids_of_moved_edges<const N: usize>(
     whole: Option<&WholeBoard>,
 ) -> Vec<SaddleGrid> {
     let views: Vec<(usize, i32)> = (1..pyramid.levels().len())
+        .filter(|&level| !is_all_noise(&pyramid.levels()[level]))
         .flat_map(|level| (-MAX_STEPS..=MAX_STEPS).map(move |steps| (level, steps)))
         .collect();
     let found = views.into_par_iter().map(|(level, steps)| {
         let coarse = pyramid.from_level(level);
-        if is_all_noise(&coarse.levels()[0]) {
-            return Vec::new();
-        }
         let filter = if steps < 0 { i16::min } else { i16::max };
         let moved = (0..steps.abs())
             .fold(coarse.levels()[0].clone(), |image, _| with_moved_edges(&image, filter));
