@@ -276,6 +276,13 @@ impl OneTiling {
         let mut grids = self.plausible::<N>(frame, &found, &mut left_out);
         let of_found = left_out.len();
         timing.lap("labels");
+        if grids.is_empty() && self.labels.are_wanted() {
+            let found = foreshortened_grids(finder, pyramid);
+            grids = self.plausible::<N>(frame, &found, &mut left_out);
+            // Foreshortened patterns of all kinds contain triangles and squares too.
+            grids.retain(|(grid, _)| is_labelled(grid));
+            timing.lap("foreshortened");
+        }
         let is_sought = self.labels.are_wanted() || self.labels.whole().is_some();
         let is_identified = |(grid, reason): &(Grid, Option<Reason>)| {
             is_labelled(grid) || is_sought && reason.is_none()
@@ -292,13 +299,6 @@ impl OneTiling {
                 grids = identified;
             }
             timing.lap("moved edges");
-        }
-        if grids.is_empty() && self.labels.are_wanted() {
-            let found = foreshortened_grids(finder, pyramid);
-            grids = self.plausible::<N>(frame, &found, &mut left_out);
-            // Foreshortened patterns of all kinds contain triangles and squares too.
-            grids.retain(|(grid, _)| is_labelled(grid));
-            timing.lap("foreshortened");
         }
         if grids.iter().all(|(_, no_labels)| no_labels.is_some()) {
             let reasons = grids.iter_mut().filter_map(|(_, no_labels)| no_labels.as_mut());
