@@ -233,7 +233,7 @@ impl Motion {
         let CameraMotion { from, to, rotation_rad, translation_mm, .. } = &self.0;
         let (turn, moved) = (rotation_rad.length(), translation_mm.length());
         let significance = significance(self.0.is_significant());
-        format!("<Motion of {to} from {from}: {turn:.6} rad, {moved:.4} mm{significance}>")
+        format!("<Motion of {to} relative to {from}: {turn:.6} rad, {moved:.4} mm{significance}>")
     }
 }
 

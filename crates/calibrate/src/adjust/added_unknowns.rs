@@ -16,7 +16,7 @@ const SAME_PRIOR: f64 = 0.05;
 /// Maximum number of iterations in which offsets and their prior are estimated alternately.
 const PRIOR_ROUNDS: usize = 10;
 
-/// Maximum number of iterations for the knots of a spline, which take less time.
+/// Maximum number of such iterations for the knots of a spline; each takes less time.
 const KNOT_ROUNDS: usize = 15;
 
 /// Relative change below which the standard deviation of the second differences has converged.

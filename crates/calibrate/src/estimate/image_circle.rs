@@ -39,7 +39,8 @@ impl ImageCircle {
         Self::filled(camera, seen).or_else(by_lens)
     }
 
-    /// Finds the circle that the corners fill: it reaches the nearest side and leaves the corners of the image empty.
+    /// Finds the circle that the detected corners fill; `None` unless it reaches the nearest side
+    /// and leaves the corners of the image empty.
     pub(crate) fn filled(camera: &Camera, seen: &[DVec2]) -> Option<Self> {
         if camera.lens.is_perspective() {
             return None;

@@ -28,7 +28,7 @@ pub enum RectificationError {
     /// The cameras are one behind the other.
     #[error("one camera is in front of the other, so the pair cannot be rectified")]
     Behind,
-    /// The view does not exist.
+    /// A rectified view is not possible.
     #[error(transparent)]
     View(#[from] UndistortionError),
 }

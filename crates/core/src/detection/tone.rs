@@ -8,8 +8,9 @@
 //!     ln q'(y) = p₁ ln(y + δ) + p₂ t + p₃ ln(1 − y + δ) + const,      t = (y − middle)/half
 //! ```
 //!
-//! so that q rises for all values of p; p = 0 is a linear camera. A corner covers the part of the curve
-//! between its own black (S = −1) and white (S = 1), in units of S:
+//! so that q rises for all values of p; p = 0 is a linear camera. A corner covers the
+//! part of the curve between its own black and white. With both axes scaled so that these are −1
+//! and 1, this part is
 //!
 //! ```text
 //!     T(S) = S + (1 − S²)·(κ₀ + κ₁ S + … + κ₅ S⁵)

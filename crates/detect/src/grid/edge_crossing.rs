@@ -24,8 +24,8 @@ use crate::tiling::CHECKER;
 use deltille_core::raster::ImageView;
 use deltille_core::statistics::median;
 
-/// Fraction of an edge at its corner that is not read: what hides a corner is seldom larger, and blur mixes the
-/// sectors there.
+/// Fraction of an edge, next to the corner, that is not read: an occlusion of the corner is seldom
+/// larger, and blur mixes the sectors there.
 const END: f64 = 0.15;
 
 /// Fraction of an edge at which the stations end. The other half belongs to the neighbour.

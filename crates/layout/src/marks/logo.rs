@@ -87,7 +87,8 @@ impl Logo {
         let logo = Self::new(rings).or_else(refused)?;
         if logo.to_string().len() > MAX_LOGO_BYTES {
             return refused(format!(
-                "the outline has {} corners, but a target file holds about 6,000: simplify its paths",
+                "the outline has {} vertices, but a target file can hold only about 6,000: \
+                 simplify the paths",
                 logo.rings.iter().map(Vec::len).sum::<usize>()
             ));
         }

@@ -120,7 +120,7 @@ impl SimulatedCorner {
         Rules { normals, pixel: gauss_legendre(nodes), orthant }
     }
 
-    /// Returns the mean over the square of a pixel.
+    /// Returns the mean over the area of a pixel.
     fn pixel(&self, rules: &Rules, x: f64, y: f64) -> f64 {
         let mut sum = 0.0;
         for &(v, weight_v) in &rules.pixel {

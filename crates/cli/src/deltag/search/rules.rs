@@ -14,12 +14,12 @@ pub struct RuleArgs {
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true,
           value_parser = crate::values::number(0.0..=1.0))]
     min_complexity: Option<f64>,
-    /// Minimum distance of every code from the all-black tile (its minimum number of white cells) [default: the
-    /// distance]
+    /// Minimum distance of every code from the all-black word (its minimum number of white cells)
+    /// [default: the distance]
     #[arg(long, value_name = "CELLS", allow_negative_numbers = true,
           value_parser = crate::values::whole(0..=64u32))]
     black_distance: Option<u32>,
-    /// Require the distance of every code from the all-white tile to be at least that of the family
+    /// Require the distance of every code from the all-white word to be at least that of the family
     #[arg(long)]
     reject_white: bool,
     /// Require a minimum distance even if some cells are hidden: apex (the 4 cells at any one

@@ -41,10 +41,12 @@ enum Experiment {
     /// photographs.csv, .json, .svg and .png
     Photographs(PhotographsArgs),
     /// The paper's §4.4: a rig of four cameras, calibrated with an icosahedron and with a cube. The
-    /// panels of both are misplaced; their poses are nominal or estimated: rig.csv
+    /// panels of both are misplaced; the calibration assumes their nominal poses or estimates them:
+    /// rig.csv
     Rig(RigArgs),
-    /// Detection and false-alarm rates of camera changes: unchanged camera, changed camera, rolling shutter, wrong
-    /// aspect ratio of the board: states.csv
+    /// Detection and false-alarm rates of the checks for a changed camera, in simulations with and
+    /// without a change, with a rolling shutter, or with a wrong aspect ratio of the board:
+    /// states.csv
     States(StatesArgs),
     /// The paper's Table 2: calibrate on the first half of a sequence of photographs, and estimate poses on the
     /// second

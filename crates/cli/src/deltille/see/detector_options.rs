@@ -47,8 +47,8 @@ pub struct FinderArgs {
     /// image)
     #[arg(long, value_name = "CURVE", default_value = "auto")]
     tone: Tone,
-    /// Ink spread of the print, outward from every dark edge: µm, none, or auto (estimated from the corners of each
-    /// image)
+    /// Ink spread of the print, the growth of dark areas on every side: µm, none, or auto
+    /// (estimated from the corners of each image)
     #[arg(long, value_name = "UM", default_value = "auto", allow_negative_numbers = true)]
     ink: Ink,
     #[command(flatten)]

@@ -23,8 +23,8 @@ use deltille_core::quantity::{Range, blur_px, light_gradient, of_full_scale, pos
 pub struct Args {
     /// Target description: the .json of `deltille board` or `deltille icosahedron`
     target: PathBuf,
-    /// Camera: a YAML file with width, height, focal_px, centre_px, model (pinhole, fisheye) and distortion, or a
-    /// camera file of ROS or OpenCV
+    /// Camera file of `deltille calibrate`, ROS or OpenCV, or a YAML file with width, height,
+    /// focal_px, centre_px, model (such as pinhole or fisheye) and distortion
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
     /// Pose of the target in the camera frame (x right, y down, z forward): rotation vector in radians and

@@ -10,7 +10,8 @@
 //!   the dual if the code has too many words;
 //! - `cosets`: unions of cosets of a linear code; `ranked`: the tags of a linear code by number, without listing the
 //!   code;
-//! - `record`: the construction as stored in the family file, which lists the codes again and proves their distance.
+//! - `record`: the construction as stored in the family file; the codes can be listed again and
+//!   their distance proved from it.
 //!
 //! The crate `deltille-search` finds such codes.
 

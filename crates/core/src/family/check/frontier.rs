@@ -38,8 +38,8 @@ pub fn rule_choices(dimension: Dimension, distance: u32, codes: &[u64]) -> Vec<R
     by_pairs.keys().map(choice).collect()
 }
 
-/// Returns the choice with the most codes whose natural false positive rate with `corrected` corrected cells is at
-/// most `accepted`.
+/// Returns the choice with the most codes among those whose natural false positive rate with
+/// `corrected` corrected cells is at most `accepted`.
 pub fn best_rule(choices: &[RuleChoice], corrected: u32, accepted: f64) -> Option<&RuleChoice> {
     let fits = |choice: &&RuleChoice| {
         choice.natural.get(corrected as usize).is_some_and(|&rate| rate <= accepted)

@@ -294,8 +294,8 @@ mod tests {
         assert!((rates[4] / exact - 1.0).abs() < 0.02, "{} and {exact}", rates[4]);
     }
 
-    /// Tests the last but one column of a table in `docs/families.md`, “False positives”, and that natural images are
-    /// always safer than fair coins.
+    /// Tests the last but one column of a table in `docs/families.md`, “False positives”,
+    /// and that the rate in natural images is always lower than for fair coin tosses.
     #[test]
     fn recommended_limits_match_the_documentation() {
         let result = [

@@ -149,9 +149,9 @@ impl SolidSpec {
     /// Finest edge of a tile, mm: what [`BoardSpec`](crate::targets::BoardSpec) allows.
     pub const MIN_TILE_MM: f64 = *EDGE_MM.start();
 
-    /// Creates a solid with edges of 150 mm, or a cuboid or mesh in its own size. It has ten tiles a side (the tags
-    /// of a triangle are then symmetric), or eight squares. A blank margin of 5 mm along its edges leaves room to
-    /// fold and glue.
+    /// Creates a solid with edges of 150 mm; a cuboid or mesh keeps its own size. A face has ten
+    /// tiles along a side (the tags on a triangle are then arranged symmetrically), or eight
+    /// squares. A blank margin of 5 mm along its edges leaves room to fold and glue.
     pub fn new(shape: SolidShape) -> Self {
         let squares = || TagSpec::for_squares(TagsIn::Black);
         let (tags, square_tags) = match shape.tilings() {

@@ -117,8 +117,9 @@ impl TagLabeller {
 fn is_word(reading: &Reading) -> bool {
     /// Half odds of a cell that is right 19 times out of 20.
     const SURE: f32 = 1.5;
-    /// Minimum fraction of certain cells. It identifies 11 of 64 boards of other families, and mistakes 3 of 160 other
-    /// boards, all dirty, for one. With 8 of 10 these are 15 and 9, with 19 of 20 they are 10 and 1.
+    /// Minimum fraction of certain cells. With 9 of 10, 11 of 64 boards of other families are
+    /// recognised as such, and 3 of 160 other boards, all dirty, are mistaken for one. With 8 of
+    /// 10, it is 15 and 9; with 19 of 20, 10 and 1.
     const SURE_CELLS: [usize; 2] = [9, 10];
     /// At least one in this many cells must have the other colour, because an untagged tile has one
     /// colour except for dirt. A random code of 16 cells fails this test once in 240, one of 25

@@ -56,7 +56,7 @@ pub(in crate::syntax) fn check(
     let value: Value =
         serde_json::from_slice(json).map_err(|error| format!("not glTF: {}", in_words(error)))?;
     if value.is_array() || !has_objects(&value) {
-        found.add("the JSON", "a list in place of an object or within a list");
+        found.add("the JSON", "an array in place of an object or within an array");
         return Ok(found);
     }
     // If a key is repeated or spelled with escapes, readers differ in which value they take. The

@@ -68,8 +68,9 @@ pub struct BoardSettings {
     #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tags_in", "tag_spacing", "tag_border", "hole", "first_id"])]
     #[serde(skip_serializing_if = "is_false")]
     untagged: bool,
-    /// Put a tag in every N-th row and column; on a checkerboard, only where that square has the tag colour (for odd N,
-    /// every second position) [default: 3; 2 on a checkerboard]
+    /// Put a tag in every N-th row and column; on a checkerboard, only where the square has the
+    /// colour of the squares with tags (for odd N, at every second position) [default: 3; 2 on a
+    /// checkerboard]
     #[arg(long, help_heading = TAGS, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MAX_ROWS))]
     tag_spacing: Option<u32>,
     /// Width of a tag's black border in cells, 0.6 to 10, at least 1 on a checkerboard [default: 1.5; 2 in black
@@ -137,7 +138,7 @@ pub struct BoardSettings {
     #[arg(long, help_heading = PRINT)]
     #[serde(skip_serializing_if = "is_false")]
     png: bool,
-    /// Write <name>.dsc, for the reference detector or its fork
+    /// Write <name>.dsc, for the detector published with the paper, or its fork
     #[arg(long, help_heading = PRINT)]
     #[serde(skip_serializing_if = "is_false")]
     dsc: bool,

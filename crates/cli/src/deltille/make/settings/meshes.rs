@@ -70,8 +70,8 @@ pub struct Meshes {
     /// cell, limited to 16384 px]
     #[arg(long, value_name = "PX", allow_negative_numbers = true, value_parser = whole(SIDE_PX))]
     texture: Option<u32>,
-    /// Distribute the faces over N textures. With --texture, each has that size, for more detail;
-    /// otherwise, the files are smaller [default: 1]
+    /// Distribute the faces over N textures. With --texture, each has that size, so the resolution
+    /// is higher; without it, the resolution is the same, but the files are smaller [default: 1]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
           value_parser = whole(1..=MAX_TEXTURES))]
     textures: Option<u32>,

@@ -140,7 +140,7 @@ pub struct SolidSettings {
     #[arg(long, help_heading = PAPER)]
     #[serde(skip_serializing_if = "is_false")]
     pub guide_page: bool,
-    /// Write <name>.dsc, for the reference detector or its fork
+    /// Write <name>.dsc, for the detector published with the paper, or its fork
     #[arg(long, help_heading = PRINT)]
     #[serde(skip_serializing_if = "is_false")]
     pub dsc: bool,

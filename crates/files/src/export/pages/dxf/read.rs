@@ -67,7 +67,8 @@ fn written_otherwise(found: &str, drawing: &CutDrawing) -> Result<(), DxfError> 
         None if same_length => Ok(()),
         other => Err(DxfError::Construct {
             line: other.map_or(1, |(index, _)| index + 1),
-            construct: "a comment, a blank or a number in another form".to_owned(),
+            construct: "a comment, whitespace or a number format that deltille does not write"
+                .to_owned(),
         }),
     }
 }
