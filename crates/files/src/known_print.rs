@@ -40,10 +40,10 @@ pub enum SheetUseError {
          {CalibrationRefinePanels}"
     )]
     Sides,
-    /// A scale of a target that was measured.
+    /// A print scale for a target whose corners were measured.
     #[error("{PrintScale}: {0} already contains the measured corner positions of the print")]
     ScaleOfMeasured(String),
-    /// A shape of a target that was measured.
+    /// A shape for a target whose corners were measured.
     #[error("{SightingBend}: {0} already contains the measured corner positions of the print")]
     ShapeOfMeasured(String),
     /// A shape with a target of several panels.

@@ -223,7 +223,8 @@ impl CalibratedCamera {
     /// Returns
     /// -------
     /// ndarray of R × C, float64, or None
-    ///     Standard deviations along the worst direction, px, at R × C positions that cover the image; NaN outside the lens.
+    ///     Standard deviations along the worst direction, px, at R × C positions that cover the
+    ///     image; NaN outside the domain of the lens model.
     #[pyo3(signature = (distance_mm = None, source = "noise"))]
     fn uncertainty_map<'py>(
         &self,
@@ -252,7 +253,7 @@ impl CalibratedCamera {
     /// Returns
     /// -------
     /// ndarray of N × 2 × 2, float64
-    ///     px²; NaN outside the lens, or if not known.
+    ///     px²; NaN outside the domain of the lens model, or if not known.
     #[pyo3(signature = (pixels, distance_mm = None, source = "noise"))]
     fn projection_covariance<'py>(
         &self,

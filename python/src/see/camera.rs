@@ -235,7 +235,8 @@ impl Camera {
     /// Returns
     /// -------
     /// ndarray of N × 3, float64
-    ///     Unit vectors in the camera frame; NaN for pixels outside the lens. For a non-central lens, see :meth:`rays`.
+    ///     Unit vectors in the camera frame; NaN for pixels outside the domain of the lens model.
+    ///     For a non-central lens, see :meth:`rays`.
     fn unproject<'py>(
         &self,
         py: Python<'py>,
@@ -256,7 +257,7 @@ impl Camera {
     /// origins : ndarray of N × 3, float64
     ///     Origins in the camera frame, mm: zero unless the lens is a ``pupil``.
     /// directions : ndarray of N × 3, float64
-    ///     Unit vectors; NaN for pixels outside the lens.
+    ///     Unit vectors; NaN for pixels outside the domain of the lens model.
     #[expect(clippy::type_complexity, reason = "two arrays")]
     fn rays<'py>(
         &self,

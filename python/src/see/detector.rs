@@ -60,7 +60,7 @@ pub struct Detector {
     asked: Arc<Asked>,
 }
 
-/// The keywords of a detector, for pickling.
+/// The keyword arguments of a detector, for pickling.
 #[derive(Clone, Default)]
 struct Asked {
     grid: Option<String>,

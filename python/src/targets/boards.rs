@@ -112,7 +112,7 @@ flat! {
     /// board_id : int, optional
     ///     Id of the first board.
     /// inverted : bool, optional
-    ///     Exchange black and white.
+    ///     Swap black and white.
     /// poster : bool, optional
     ///     Split a board larger than the paper across several pages, to be joined.
     /// packed : bool, optional

@@ -231,7 +231,7 @@ impl Made {
         serde_json::to_string(&self.printing.hinges()).unwrap_or_default()
     }
 
-    /// Returns names and bytes, alternating, of the files in a format.
+    /// Returns the files of the target in a format, as alternating names and bytes.
     ///
     /// # Errors
     /// Throws if the target cannot be written in this format.

@@ -17,8 +17,8 @@ use crate::problem::whitening::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
 use deltille_core::camera::{Camera, PROJECTION_PARAMETERS};
 use deltille_core::statistics::median;
 
-/// Fraction of the squared residuals above which the noise of detections explains them well enough.
-/// The rest does not matter, and no remedy is tested.
+/// If the noise of detections explains more than this fraction of the squared residuals, the rest
+/// does not matter, and no remedy is tested.
 const EXPLAINED: f64 = 1.0 / (1.0 + MATTERS * MATTERS);
 
 /// A remedy counts as equal to the best one if it reaches this fraction of its gain: the sum of

@@ -131,7 +131,7 @@ enum Command {
     Rectify(undistort::PairArgs),
     /// Measure the run time of the detection stages on this machine
     Bench(bench::Args),
-    /// Evaluate the library on simulated images, or on the paper's photographs
+    /// Evaluate the library on simulated images, or on the photographs of Ha et al. (ICCV 2017)
     Experiment(experiment::Args),
     /// Generate shell completions
     #[command(after_help = shell::COMPLETIONS)]

@@ -119,7 +119,7 @@ pub(crate) struct Levels {
 }
 
 impl Levels {
-    /// Returns black at a point of the tile, and the contrast to white.
+    /// Returns the level of black at a point of the tile, and the contrast to white.
     pub(crate) fn at(&self, DVec2 { x: u, y: v }: DVec2) -> [f64; 2] {
         [self.dark, self.contrast].map(|[a, b, c]| a + b * u + c * v)
     }
@@ -278,7 +278,7 @@ impl GridLight {
         Some(Levels { dark, contrast })
     }
 
-    /// Returns black at an edge, and the contrast to white.
+    /// Returns the level of black at an edge, and the contrast to white.
     fn edge_levels(&self, profile: &Profile) -> Option<[f64; 2]> {
         let DVec2 { x, y } = profile.normal;
         let [xx, xy, yy] = self.blur_px2;

@@ -58,7 +58,7 @@ pub(crate) struct Sample {
 }
 
 impl Optics {
-    /// Returns a parameter for the equations of the corners.
+    /// Returns the parameter at this index, in the form used by the equations of the corners.
     pub(super) fn common(&self, parameter: usize) -> Common {
         match parameter {
             0..TONE_PARAMS => Common::Tone { parameter, moved: Box::new(self.moved(parameter)) },

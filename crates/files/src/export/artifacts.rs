@@ -158,7 +158,7 @@ impl Default for Making {
     }
 }
 
-/// Error of making files of a target.
+/// Reason why a file of a target cannot be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MakeError {

@@ -12,7 +12,8 @@ use deltille_core::raster::{Coverage, Gray, gaussian};
 /// Maximum distance between the image of an edge and its chords, px.
 const MAX_CHORD_ERROR_PX: f64 = 1e-4;
 
-/// Maximum depth of the subdivision of an edge: 2¹⁰ pieces follow any lens.
+/// Maximum depth of the subdivision of an edge: 2¹⁰ chords follow the image of an
+/// edge through any lens.
 const MAX_DIVISIONS: u32 = 10;
 
 /// Illumination and imperfections of an image.

@@ -12,9 +12,11 @@ use deltille::limits::{MAX_FAMILY_BYTES, read_short_text};
 use deltille_core::words::counted;
 
 /// Text at the end of `--help`.
-pub const HELP: &str = "The codes are the hexadecimal literals of the table, in order. If there are none, they are the \
-    lines that contain only hexadecimal digits. Bits are read row by row from the upper left, in triangles from the \
-    apex; AprilTag 3 tables define their own bit positions. The distance is computed by comparing all codes.
+pub const HELP: &str = "The codes are the hexadecimal literals of the table, in order; \
+    in a table without literals, the lines that contain only hexadecimal digits. \
+    Bits are read row by row from the upper left, in triangles from the \
+    apex; AprilTag 3 tables define their own bit positions. \
+    The distance is computed by comparing all codes.
 
 Examples:
   deltag import tag36h11.c -o families

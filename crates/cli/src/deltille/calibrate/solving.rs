@@ -47,7 +47,7 @@ pub struct SolveArgs {
     #[arg(long, conflicts_with_all = ["shape", "board_shape"])]
     measure_target: bool,
     /// Standard uncertainty per axis of the corner positions in the description, such as 0.05mm, or 0 for an exact
-    /// board. It is included in the observed standard deviations [default: that of a
+    /// board. It contributes to the standard deviations reported as observed [default: that of a
     /// measured target, otherwise 0.1 mm, at most 0.5 % of an edge]
     #[arg(long, value_name = "LENGTH", value_parser = accuracy)]
     board_accuracy: Option<f64>,

@@ -23,7 +23,7 @@ pub struct Args {
     #[arg(long, value_name = "LENGTH", default_value = "25mm", value_parser = parse_length_mm)]
     edge: f64,
     /// Gap between tags as a fraction of the tag's side, 0.1 to 0.9 (Kalibr's tagSpacing)
-    #[arg(long, value_name = "TAGS", default_value_t = 0.3, value_parser = number(0.1..=0.9))]
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.3, value_parser = number(0.1..=0.9))]
     gap: f64,
     /// Tag family; Kalibr supports only aprilTag36h11
     #[arg(long, help_heading = TAGS, default_value = "aprilTag36h11")]

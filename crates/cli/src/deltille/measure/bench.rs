@@ -35,8 +35,8 @@ struct DetectArgs {
     images: Vec<PathBuf>,
     #[command(flatten)]
     finder: FinderArgs,
-    /// Number of runs per image; the fastest is reported, because other processes slow down the
-    /// others
+    /// Number of runs per image; the fastest is reported, because it is the one least slowed down
+    /// by other processes
     #[arg(long, value_name = "N", default_value_t = 5,
           value_parser = whole(1..=1000u32))]
     repeat: u32,

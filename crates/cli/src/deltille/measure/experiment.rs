@@ -40,16 +40,16 @@ enum Experiment {
     /// Detection on simulated photographs of a printed page with known ground truth, degraded in one way at a time:
     /// photographs.csv, .json, .svg and .png
     Photographs(PhotographsArgs),
-    /// The paper's §4.4: a rig of four cameras, calibrated with an icosahedron and with a cube. The
-    /// panels of both are misplaced; the calibration assumes their nominal poses or estimates them:
-    /// rig.csv
+    /// §4.4 of Ha et al.: a rig of four cameras, calibrated with an icosahedron and with a cube.
+    /// The panels of both are misplaced; the calibration assumes their nominal poses or estimates
+    /// them: rig.csv
     Rig(RigArgs),
     /// Detection and false-alarm rates of the checks for a changed camera, in simulations with and
     /// without a change, with a rolling shutter, or with a wrong aspect ratio of the board:
     /// states.csv
     States(StatesArgs),
-    /// The paper's Table 2: calibrate on the first half of a sequence of photographs, and estimate poses on the
-    /// second
+    /// Table 2 of Ha et al.: calibrate on the first half of a sequence of photographs, and estimate
+    /// poses on the second
     Table2(Table2Args),
 }
 
@@ -87,7 +87,8 @@ fn noise_px(text: &str) -> Result<f64, String> {
 
 #[derive(clap::Args)]
 struct Table2Args {
-    /// Folder with the photographs of the paper's 10 × 11 board, in the order of their names
+    /// Folder with the photographs of the 10 × 11 board of Ha et al., read in order of their
+    /// names
     folder: PathBuf,
 }
 

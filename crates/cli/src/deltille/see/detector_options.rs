@@ -23,8 +23,10 @@ pub struct FinderArgs {
     /// Detect untagged boards of this tiling instead
     #[arg(long, value_name = "KIND")]
     grid: Option<Kind>,
-    /// Number of corner rows of the untagged board. With --cols, a fully visible board is labelled: corner (0, 0) is at
-    /// the lower left; on a checkerboard, at a dark corner square (the lower one if there are two)
+    /// Number of corner rows of the untagged board. With --cols, a fully visible board is labelled:
+    /// corner (0, 0) is at the lower left; a checkerboard is turned so that the square in its lower
+    /// left corner is dark (if two orientations are possible, the one whose corner (0, 0) is lower
+    /// in the image)
     #[arg(long, conflicts_with = "target", requires = "cols", value_parser = whole(SIDES))]
     rows: Option<u32>,
     /// Number of corners per row of the untagged board

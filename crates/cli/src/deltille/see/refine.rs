@@ -54,7 +54,7 @@ pub struct Args {
 /// Corner refinement method.
 #[derive(Clone, Copy, ValueEnum)]
 pub enum Method {
-    /// Fit of a cubic (deltille) or quadric (checker), as in the paper; no covariances
+    /// Fit of a cubic (deltille) or quadric (checker), as in Ha et al., ICCV 2017; no covariances
     Polynomial,
     /// Fit of a blurred corner model to the pixels, with covariances
     Model,

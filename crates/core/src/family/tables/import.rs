@@ -22,7 +22,8 @@ pub struct ImportSpec {
     pub name: String,
     /// Description of the table's source.
     pub source: String,
-    /// Tiles that the tags fill; `None` if the positions of the bits in the table show it.
+    /// Kind of the tiles that the tags fill; `None` if it follows from the bit positions in
+    /// the table.
     pub kind: Option<GridKind>,
     /// Number of cells of a tag; `None` if the table states it, as in `nbits = 36`.
     pub bits: Option<u32>,

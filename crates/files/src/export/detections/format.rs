@@ -32,7 +32,7 @@ pub const DETECTION_FORMATS: &[DetectionFormat] = &[
     },
     DetectionFormat {
         name: "orpc",
-        help: "The corner list of the detector published with the paper",
+        help: "The corner list of the reference detector of Ha et al. (ICCV 2017)",
         kind: || Kind::of(orpc::HEAD.as_bytes()),
         text: Some(orpc::write),
         is_of_one_target: true,

@@ -60,7 +60,8 @@ pub enum MeshError {
         texels: f64,
         /// The number needed.
         needed: f64,
-        /// The minimum setting: a resolution in the unit of the request, or more textures.
+        /// The minimum that suffices, in words: a resolution in the unit of the request or,
+        /// if that helps, a number of textures.
         least: String,
     },
     /// More textures than faces, or none.

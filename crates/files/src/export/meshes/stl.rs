@@ -16,7 +16,7 @@ pub fn to_bytes(name: &str, triangles_mm: &[[DVec3; 3]]) -> Vec<u8> {
     bytes
 }
 
-/// The header before the triangles, whose text readers ignore.
+/// The header before the triangles; readers ignore its text.
 pub fn header(name: &str) -> [u8; 80] {
     let mut header = [b' '; 80];
     let words = format!("deltille {name}, millimetres");

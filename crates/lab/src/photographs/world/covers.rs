@@ -109,7 +109,7 @@ impl Covers {
         Self(self.0.iter().filter(reaches).copied().collect())
     }
 
-    /// Returns whether there are no covers.
+    /// Returns whether nothing covers the board.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

@@ -68,8 +68,8 @@ pub struct BoardSettings {
     #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tags_in", "tag_spacing", "tag_border", "hole", "first_id"])]
     #[serde(skip_serializing_if = "is_false")]
     untagged: bool,
-    /// Put a tag in every N-th row and column; on a checkerboard, only where the square has the
-    /// colour of the squares with tags (for odd N, at every second position) [default: 3; 2 on a
+    /// Put a tag in every N-th row and column; on a checkerboard, only where that square has the
+    /// colour given by --tags-in (for odd N, at every second position) [default: 3; 2 on a
     /// checkerboard]
     #[arg(long, help_heading = TAGS, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MAX_ROWS))]
     tag_spacing: Option<u32>,
@@ -138,7 +138,7 @@ pub struct BoardSettings {
     #[arg(long, help_heading = PRINT)]
     #[serde(skip_serializing_if = "is_false")]
     png: bool,
-    /// Write <name>.dsc, for the detector published with the paper, or its fork
+    /// Write <name>.dsc, for the reference detector of Ha et al. (ICCV 2017), or its fork
     #[arg(long, help_heading = PRINT)]
     #[serde(skip_serializing_if = "is_false")]
     dsc: bool,

@@ -23,8 +23,8 @@ pub struct Finishing {
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     mirrored: bool,
-    /// Print white under each page of the PDF in a spot colour of this name, such as White or
-    /// RDG_WHITE, and overprint everything else on it
+    /// Print a white underprint on each page of the PDF in a spot colour of this name, such as
+    /// White or RDG_WHITE, and overprint everything else on it
     #[arg(long, value_name = "NAME")]
     white: Option<String>,
     /// Print a cut line along the middle of the margin, or between boards that share a sheet; the

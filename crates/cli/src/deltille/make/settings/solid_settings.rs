@@ -69,7 +69,8 @@ pub struct SolidSettings {
           conflicts_with_all = ["family", "dense", "tag_spacing", "tag_border", "hole", "first_id", "tag_ids"])]
     #[serde(skip_serializing_if = "is_false")]
     pub untagged: bool,
-    /// Exchange black and white: white tiles on a black field that extends into the margin [default margin: 8mm]
+    /// Swap black and white: white tiles on a black field that extends into the margin [default
+    /// margin: 8mm]
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     pub invert: bool,
@@ -140,7 +141,7 @@ pub struct SolidSettings {
     #[arg(long, help_heading = PAPER)]
     #[serde(skip_serializing_if = "is_false")]
     pub guide_page: bool,
-    /// Write <name>.dsc, for the detector published with the paper, or its fork
+    /// Write <name>.dsc, for the reference detector of Ha et al. (ICCV 2017), or its fork
     #[arg(long, help_heading = PRINT)]
     #[serde(skip_serializing_if = "is_false")]
     pub dsc: bool,
