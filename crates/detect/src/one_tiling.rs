@@ -283,16 +283,12 @@ impl OneTiling {
             grids.retain(|(grid, _)| is_labelled(grid));
             timing.lap("foreshortened");
         }
-        let is_sought = self.labels.are_wanted() || self.labels.whole().is_some();
-        let is_identified = |(grid, reason): &(Grid, Option<Reason>)| {
-            is_labelled(grid) || is_sought && reason.is_none()
-        };
-        if is_sought && !grids.iter().any(is_identified) {
+        if self.is_sought() && !grids.iter().any(|found| self.is_identified(found)) {
             let found = grids_of_moved_edges(finder, pyramid, self.labels.whole());
             let mut identified = self.plausible::<N>(frame, &found, &mut Vec::new());
             // Dots look like squares whose edges have moved.
             identified.retain(|found| {
-                is_identified(found)
+                self.is_identified(found)
                     && (is_confirmed(&found.0) || has_straight_edges(frame.image, &found.0))
             });
             if !identified.is_empty() {
@@ -347,7 +343,7 @@ impl OneTiling {
             is_certain || is_of_squares(frame.image, grid, ink, may_have_tags)
         });
         // Refinement has removed some false corners.
-        refuse_patterns(frame.pyramid, &mut grids);
+        self.refuse_patterns(frame.pyramid, &mut grids);
         (grids, optics)
     }
 
@@ -394,7 +390,7 @@ impl OneTiling {
             is_confirmed(grid) || is_plausible
         });
         left_out.extend(refused);
-        refuse_patterns(frame.pyramid, &mut grids);
+        self.refuse_patterns(frame.pyramid, &mut grids);
         left_out.extend(report_once(&mut grids));
         let (count, mut corners) = (grids.len(), 0);
         grids.retain(|(grid, _)| {
@@ -407,6 +403,31 @@ impl OneTiling {
             (grid.panel.is_none(), grid.target.clone(), grid.panel.unwrap_or(u32::MAX))
         });
         grids
+    }
+
+    /// Returns whether a target or a board of known size is searched for.
+    fn is_sought(&self) -> bool {
+        self.labels.are_wanted() || self.labels.whole().is_some()
+    }
+
+    /// Returns whether a grid is labelled, or is the complete board of known size.
+    fn is_identified(&self, (grid, no_labels): &(Grid, Option<Reason>)) -> bool {
+        is_labelled(grid) || self.is_sought() && no_labels.is_none()
+    }
+
+    /// Removes unconfirmed grids whose pattern continues beyond their border.
+    fn refuse_patterns(&self, pyramid: &Pyramid, grids: &mut Judged) {
+        loop {
+            let all: Vec<&Grid> = grids.iter().map(|(grid, _)| grid).collect();
+            let is_board = |i: usize| self.is_identified(&grids[i]);
+            let mut goes_on = go_on(&pyramid.levels()[0], &all, is_board).into_iter();
+            let count = grids.len();
+            grids.retain(|(grid, _)| goes_on.next() != Some(true) || is_confirmed(grid));
+            // A removed grid is part of the pattern into which others may continue.
+            if grids.len() == count {
+                return;
+            }
+        }
     }
 
     /// Refines all grids on the level of the pyramid that suits their blur. Returns the common
@@ -486,20 +507,6 @@ fn is_confirmed(grid: &Grid) -> bool {
 /// Returns whether a grid is confirmed by tags or as a whole board.
 fn is_labelled(grid: &Grid) -> bool {
     is_confirmed(grid) || grid.panel.is_some()
-}
-
-/// Removes unconfirmed grids whose pattern continues beyond their border.
-fn refuse_patterns(pyramid: &Pyramid, grids: &mut Judged) {
-    loop {
-        let all: Vec<&Grid> = grids.iter().map(|(grid, _)| grid).collect();
-        let mut goes_on = go_on(&pyramid.levels()[0], &all).into_iter();
-        let count = grids.len();
-        grids.retain(|(grid, _)| goes_on.next() != Some(true) || is_labelled(grid));
-        // A removed grid is part of the pattern into which others may continue.
-        if grids.len() == count {
-            return;
-        }
-    }
 }
 
 fn refiner(kind: GridKind, config: DetectorConfig, edge_mm: Option<f64>) -> Refiner {

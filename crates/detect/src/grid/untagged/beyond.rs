@@ -30,6 +30,10 @@ use deltille_core::raster::{Gray, ImageView};
 /// Maximum fraction of pairs of squares beyond a board that differ like black and white.
 const MAX_DIFFERENT: f64 = 0.2;
 
+/// The same for complete boards of known size. Cluttered surroundings, seen by the few pairs around a small board, reach a
+/// fifth; random cells that happen to have the size differ in half of the pairs. This is midway.
+const MAX_DIFFERENT_BOARD: f64 = 0.35;
+
 /// The same for grids that are rows of corners instead of an area. Random cells form rows more
 /// easily.
 const MAX_DIFFERENT_ROWS: f64 = 0.08;
@@ -47,9 +51,14 @@ const ROWS: i32 = 2;
 /// Distance from a corner of another grid, in edges, within which a square belongs to that grid.
 const OTHER_GRID: f64 = 1.0;
 
-/// Returns for each grid of an image whether its pattern continues beyond its end. `image` is the finest level. Returns
-/// false for deltille grids, because six alternating sectors do not occur by coincidence.
-pub(crate) fn go_on(image: &Gray<i16>, grids: &[&Grid]) -> Vec<bool> {
+/// Returns for each grid of an image whether its pattern continues beyond its end. `image` is the finest level, and
+/// `is_board` whether a grid is a complete board of known size. Returns false for deltille grids, because six
+/// alternating sectors do not occur by coincidence.
+pub(crate) fn go_on(
+    image: &Gray<i16>,
+    grids: &[&Grid],
+    is_board: impl Fn(usize) -> bool,
+) -> Vec<bool> {
     let mut corners = Buckets::new(image.width(), image.height());
     let mut owners = Vec::new();
     let several = if grids.len() > 1 { grids } else { &[] };
@@ -64,7 +73,11 @@ pub(crate) fn go_on(image: &Gray<i16>, grids: &[&Grid]) -> Vec<bool> {
         let goes_on = |tiles: &CheckerTiles, most| tiles.goes_on(is_others, most);
         grid.kind == GridKind::Checker && {
             let all = CheckerTiles::of(image.into(), grid);
-            let most = if all.is_compact() { MAX_DIFFERENT } else { MAX_DIFFERENT_ROWS };
+            let most = match all.is_compact() {
+                true if is_board(i) => MAX_DIFFERENT_BOARD,
+                true => MAX_DIFFERENT,
+                false => MAX_DIFFERENT_ROWS,
+            };
             goes_on(&all, most) || {
                 let squares = all.without_loose_corners();
                 let stand_apart = squares.corners.len() < all.corners.len();
@@ -240,7 +253,7 @@ mod tests {
     }
 
     fn goes_on(image: &Gray<i16>) -> bool {
-        go_on(image, &[&grid()]) == [true]
+        go_on(image, &[&grid()], |_| false) == [true]
     }
 
     #[test]
@@ -264,6 +277,20 @@ mod tests {
     }
 
     #[test]
+    fn clutter_beyond_the_margin_ends_a_board_of_known_size() {
+        let margin = |row, col| (-2..6).contains(&row) && (-2..7).contains(&col);
+        let is_dark = |row: i32, col: i32| (row * 7919 + col * 104_729).rem_euclid(127) % 2 == 0;
+        let clutter = picture(|row, col| match margin(row, col) {
+            false if is_dark(row, col) => 100,
+            _ => 800,
+        });
+        assert!(goes_on(&clutter));
+        assert_eq!(go_on(&clutter, &[&grid()], |_| true), [false]);
+        let dots = picture(|row, col| if (row + col) % 2 == 0 { 100 } else { 800 });
+        assert_eq!(go_on(&dots, &[&grid()], |_| true), [true]);
+    }
+
+    #[test]
     fn squares_of_another_grid_do_not_count() {
         let image = picture(|row, col| if (row + col) % 2 == 0 { 100 } else { 800 });
         let mut around = grid();
@@ -277,6 +304,6 @@ mod tests {
                 }
             }
         }
-        assert!(!go_on(&image, &[&grid(), &around])[0]);
+        assert!(!go_on(&image, &[&grid(), &around], |_| false)[0]);
     }
 }
