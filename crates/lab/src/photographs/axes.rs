@@ -33,6 +33,12 @@ pub enum Axis {
     Scale,
     /// Demosaicing method.
     Mosaic,
+    /// Gain of the exposure behind colour filters.
+    ColourExposure,
+    /// Width relative to the sensor to which the colour image is resized.
+    Resampling,
+    /// Processing between the sensor and the file.
+    Processing,
     /// Sharpening, as a multiple of the detail that a blur removes.
     Sharpening,
     /// Change of illumination from one side of the image to the other.
@@ -52,7 +58,7 @@ pub struct Level {
 
 impl Axis {
     /// All axes, in the order of the report.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 20] = [
         Self::Blur,
         Self::Motion,
         Self::Noise,
@@ -67,6 +73,9 @@ impl Axis {
         Self::Curl,
         Self::Scale,
         Self::Mosaic,
+        Self::ColourExposure,
+        Self::Resampling,
+        Self::Processing,
         Self::Sharpening,
         Self::Light,
         Self::Background,
@@ -89,6 +98,9 @@ impl Axis {
             Self::Curl => "curl",
             Self::Scale => "scale",
             Self::Mosaic => "mosaic",
+            Self::ColourExposure => "colour-exposure",
+            Self::Resampling => "resampling",
+            Self::Processing => "processing",
             Self::Sharpening => "sharpening",
             Self::Light => "light",
             Self::Background => "background",
@@ -112,6 +124,9 @@ impl Axis {
             Self::Curl => "sag of the sheet, % of the board width",
             Self::Scale => "image width after resizing, px",
             Self::Mosaic => "mosaic",
+            Self::ColourExposure => "exposure gain, colour",
+            Self::Resampling => "width relative to the sensor, colour",
+            Self::Processing => "processing",
             Self::Sharpening => "sharpening factor",
             Self::Light => "illumination change across the image, ± %",
             Self::Background => "background",
@@ -179,6 +194,19 @@ impl Axis {
                 ("none", scene()),
                 ("bilinear", Scene { mosaic: Mosaic::Bilinear, ..scene() }),
                 ("edges", Scene { mosaic: Mosaic::Edges, ..scene() }),
+            ]),
+            Self::ColourExposure => numbers(&[1.0, 2.0, 3.0, 5.0, 8.0], |s, v| {
+                *s = Scene { mosaic: Mosaic::Edges, exposure: v, ..Scene::default() };
+            }),
+            Self::Resampling => numbers(&[1.0, 0.75, 0.5], |s, v| {
+                let width_px = Some((v * s.size_px[0] as f64).round() as u32);
+                // A bit has three pixels at half the width.
+                *s = Scene { mosaic: Mosaic::Edges, bit_px: 6.0, width_px, ..Scene::default() };
+            }),
+            Self::Processing => named(vec![
+                ("none", scene()),
+                ("mosaic", Scene { mosaic: Mosaic::Edges, ..scene() }),
+                ("phone", Scene::phone()),
             ]),
             Self::Sharpening => numbers(&[0.0, 0.3, 0.6, 1.0, 1.5, 2.5], |s, v| s.sharpening = v),
             Self::Light => {

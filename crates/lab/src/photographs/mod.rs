@@ -16,7 +16,7 @@
 //! 4. `photograph` renders a photograph with its ground truth.
 //! 5. `result` compares detections with the ground truth, and produces tables and the plot.
 //!
-//! Not simulated: print that is not black and white, depth of field, lateral colour, rolling shutter, noise reduction.
+//! Not simulated: print that is not black and white, depth of field, lateral colour, rolling shutter.
 
 pub mod axes;
 pub mod camera;

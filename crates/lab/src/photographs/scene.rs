@@ -40,6 +40,9 @@ pub struct Scene {
     pub noise: f64,
     /// Recording of colours.
     pub mosaic: Mosaic,
+    /// Noise reduction: standard deviation of the brightness differences that are averaged, as a multiple of the noise;
+    /// 0 for none.
+    pub denoising: f64,
     /// Tone curve from light to grey values.
     pub tone: Tone,
     /// Sharpening: multiple of the detail removed by a blur of [`SHARPENING_PX`] that is added.
@@ -76,6 +79,7 @@ impl Default for Scene {
             exposure: 1.0,
             noise: 0.005,
             mosaic: Mosaic::None,
+            denoising: 0.0,
             tone: Tone::Srgb,
             sharpening: 0.0,
             jpeg: None,
@@ -85,6 +89,18 @@ impl Default for Scene {
 }
 
 impl Scene {
+    /// Returns the processing of an ordinary telephone: mosaic, noise reduction, contrast, sharpening and compression.
+    pub fn phone() -> Self {
+        Self {
+            mosaic: Mosaic::Edges,
+            denoising: 3.0,
+            tone: Tone::SoftS,
+            sharpening: 0.6,
+            jpeg: Some(92),
+            ..Self::default()
+        }
+    }
+
     /// Returns the number of file pixels per sensor pixel.
     pub fn scale(&self) -> f64 {
         self.width_px.map_or(1.0, |width| f64::from(width) / self.size_px[0] as f64)

@@ -1,4 +1,4 @@
-//! From light to the grey values of a file: exposure, noise, mosaic, tone, sharpening, quantization to eight bits,
+//! From light to the grey values of a file: exposure, noise, mosaic, noise reduction, tone, sharpening, quantization to eight bits,
 //! compression, resizing.
 
 use image::codecs::jpeg::JpegEncoder;
@@ -43,11 +43,38 @@ fn developed(light: &Gray<f32>, scene: &Scene, rng: &mut ChaCha8Rng) -> Gray<f32
     };
     let raw = Gray::from_fn(light.width(), light.height(), |x, y| noisy(exposed.at(x, y), x, y));
     if scene.mosaic == Mosaic::None {
-        return raw.map(|v| scene.tone.grey(v));
+        return denoised(raw, scene).map(|v| scene.tone.grey(v));
     }
-    let colours = interpolated(&raw, scene.mosaic);
+    let colours = interpolated(&raw, scene.mosaic).map(|colour| denoised(colour, scene));
     Gray::from_fn(raw.width(), raw.height(), |x, y| {
         colours.iter().zip(LUMA).map(|(c, weight)| weight * scene.tone.grey(c.at(x, y))).sum()
+    })
+}
+
+/// Averages neighbours of similar brightness (a bilateral filter of 5 × 5 pixels).
+fn denoised(light: Gray<f32>, scene: &Scene) -> Gray<f32> {
+    /// Standard deviation of the weights in space, px.
+    const SPACE_PX: f32 = 1.0;
+    let range = (scene.denoising * scene.noise) as f32;
+    if range == 0.0 {
+        return light;
+    }
+    let (width, height) = (light.width(), light.height());
+    let near = |i: usize, size: usize| i.saturating_sub(2)..(i + 3).min(size);
+    let square = |a: usize, b: usize| (a.abs_diff(b) as f32 / SPACE_PX).powi(2);
+    Gray::from_fn(width, height, |x, y| {
+        let here = light.at(x, y);
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for v in near(y, height) {
+            for u in near(x, width) {
+                let there = light.at(u, v);
+                let off = square(u, x) + square(v, y) + ((there - here) / range).powi(2);
+                let weight = (-off / 2.0).exp();
+                sum += weight * there;
+                weights += weight;
+            }
+        }
+        sum / weights
     })
 }
 
@@ -123,6 +150,20 @@ mod tests {
             let sd = variance.sqrt();
             assert!(sd > least && sd < most, "{mosaic:?}: {sd}");
         }
+    }
+
+    #[test]
+    fn denoising_keeps_edges_and_averages_noise() {
+        let edge = Gray::from_fn(64, 64, |x, _| if x < 32 { 0.2 } else { 0.6f32 });
+        let noisy = Scene { noise: 0.02, tone: Tone::Linear, ..Scene::default() };
+        let spread = |scene: &Scene| {
+            let grey = recorded(&edge, scene);
+            let off = |x: usize, y: usize| {
+                (f64::from(grey.at(x, y)) - if x < 32 { 51.0 } else { 153.0 }).powi(2)
+            };
+            (0..64).flat_map(|y| (0..64).map(move |x| off(x, y))).sum::<f64>().sqrt()
+        };
+        assert!(spread(&Scene { denoising: 3.0, ..noisy.clone() }) < 0.6 * spread(&noisy));
     }
 
     #[test]
