@@ -8,13 +8,14 @@ use super::edge::{End, MAX_CHORD_RAD, is_clean_somehow};
 use super::edge_crossing::{EdgeCrossing, Neighbour};
 use super::effort::Effort;
 use super::links::{facing_ray, have_similar_contrast};
-use super::local_map::{Bend, LocalMap};
+use super::local_map::{LocalMap, Shape};
 use super::rectified::Rectified;
 use super::saddle_grid::{Growing, GrownSaddle};
+use super::spacing::Spacing;
 use super::untagged::checker_tiles::parity;
 use crate::corners::saddles::{Saddle, SaddleFinder};
 use crate::corners::sectors::{Sectors, turn};
-use crate::tiling::{neighbours, step};
+use crate::tiling::{kind, neighbours, step};
 use deltille_core::lattice::Vertex;
 use deltille_core::raster::Pyramid;
 
@@ -39,8 +40,10 @@ pub(super) fn fill_gaps<const N: usize>(
             .filter(|v| !grid.contains_key(v) && !tried.contains(v))
             .collect();
         let mut grown = false;
+        let at = |v: Vertex| grid.get(&v).map(|grown| grown.saddle.position);
+        let spacing = Spacing::of(kind::<N>(), grid.keys().copied(), at);
         for vertex in empty {
-            let Some(predicted) = predict(grid, vertex) else {
+            let Some(predicted) = predict(grid, spacing, vertex) else {
                 continue;
             };
             if let Some(placed) = corner_near(finder, pyramid, grid, vertex, predicted, effort) {
@@ -65,6 +68,8 @@ struct Predicted {
     position: DVec2,
     /// Length of an edge there, px.
     edge_px: f64,
+    /// Spacing of the grid.
+    spacing: Spacing,
 }
 
 /// Predicts a missing corner as the mean of the predictions of the rows through `vertex`. If p, q, r are the next three
@@ -75,9 +80,15 @@ struct Predicted {
 ///     2 p − q              where r is missing: a straight row with equal edges
 /// ```
 ///
+/// or the same polynomials with the spacing of the grid.
+///
 /// If fewer than two rows predict it, a local map of the corners around is used, provided that there are two
 /// neighbours. Otherwise returns `None`.
-fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<Predicted> {
+fn predict<const N: usize>(
+    grid: &Growing<N>,
+    spacing: Spacing,
+    vertex: Vertex,
+) -> Option<Predicted> {
     let at = |v: Vertex| grid.get(&v).map(|grown| grown.saddle.position);
     let mut sum = DVec2::ZERO;
     let (mut count, mut edge) = (0.0, 0.0);
@@ -87,22 +98,27 @@ fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<Predicte
         let (Some(p), Some(q)) = (at(first), at(second)) else {
             continue;
         };
-        sum += match at(second + step) {
-            Some(r) => 3.0 * p - 3.0 * q + r,
-            None => 2.0 * p - q,
-        };
-        edge += (p.x - q.x).hypot(p.y - q.y);
+        let width = |from: Vertex| spacing.width(from, step);
+        let (to_p, pq) = (width(vertex), width(first));
+        let slope = (p - q) / pq;
+        let bend = at(second + step).map_or(DVec2::ZERO, |r| {
+            let qr = width(second);
+            (slope - (q - r) / qr) / (pq + qr)
+        });
+        sum += p + to_p * (slope + (to_p + pq) * bend);
+        edge += slope.length() * to_p.min(pq);
         count += 1.0;
     }
     if count >= 2.0 {
-        return Some(Predicted { position: sum / count, edge_px: edge / count });
+        return Some(Predicted { position: sum / count, edge_px: edge / count, spacing });
     }
     // The seed of a grid has no rows yet, but has two corners next to the vertex.
     let beside: Vec<DVec2> = neighbours::<N>(vertex).into_iter().filter_map(at).collect();
-    let map = (beside.len() >= 2).then(|| LocalMap::about::<N>(vertex, at, Bend::usual()))??;
+    let map =
+        (beside.len() >= 2).then(|| LocalMap::about::<N>(vertex, at, Shape::usual(spacing)))??;
     let px = |p: &DVec2| (p.x - map.place.x).hypot(p.y - map.place.y);
     let edge_px = beside.iter().map(px).sum::<f64>() / beside.len() as f64;
-    Some(Predicted { position: map.place, edge_px })
+    Some(Predicted { position: map.place, edge_px, spacing })
 }
 
 /// Returns the corner at `vertex`, if one is found near its prediction. The search uses the image.
@@ -113,7 +129,7 @@ fn corner_near<const N: usize>(
     pyramid: &Pyramid,
     grid: &Growing<N>,
     vertex: Vertex,
-    Predicted { position, edge_px }: Predicted,
+    Predicted { position, edge_px, spacing }: Predicted,
     effort: &mut Effort,
 ) -> Option<GrownSaddle<N>> {
     if !effort.spend(LOOKS_FOR_CORNER) {
@@ -124,13 +140,14 @@ fn corner_near<const N: usize>(
     // A blurred corner is found best on the pyramid level of its neighbours.
     let levels = neighbours.iter().filter_map(|v| Some(grid.get(v)?.saddle.level));
     let level = levels.max().unwrap_or(0);
-    let meeting = |place| met_by_edges(pyramid, grid, vertex, place, level);
+    let meeting = |place| met_by_edges(pyramid, grid, spacing, vertex, place, level);
     let at_place = |saddle: Saddle<N>| {
         placed_at(pyramid, grid, vertex, saddle).or_else(|| meeting(saddle.position))
     };
     let found = finder.near(pyramid, level, position, reach, at_place).or_else(|| {
         let seen = |k: usize| grid.get(&(vertex + step::<N>(k))).map(|g| g.saddle.position);
-        let edge = |k: usize| seen(k).map(|place| place - position);
+        let width = |k: usize| spacing.width(vertex, step::<N>(k));
+        let edge = |k: usize| seen(k).map(|place| (place - position) / width(k));
         (0..N).find_map(|k| {
             let edges = [edge(k)?, edge(k + 1)?];
             Rectified::views::<N>(position, k, edges)
@@ -146,12 +163,13 @@ fn corner_near<const N: usize>(
 fn met_by_edges<const N: usize>(
     pyramid: &Pyramid,
     grid: &Growing<N>,
+    spacing: Spacing,
     vertex: Vertex,
     position: DVec2,
     level: usize,
 ) -> Option<GrownSaddle<N>> {
     let at = |v: Vertex| grid.get(&v).map(|grown| grown.saddle.position);
-    let map = LocalMap::about::<N>(vertex, at, Bend::usual())?;
+    let map = LocalMap::about::<N>(vertex, at, Shape::usual(spacing))?;
     let on_level = |place: DVec2| Pyramid::from_level_0(level, place);
     let beside = |k: usize| {
         let seen = at(vertex + step::<N>(k));

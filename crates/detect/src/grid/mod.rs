@@ -7,8 +7,8 @@
 //! 2. `grow` starts from four corners and grows tile by tile. `gaps` searches for missing corners; where tiles are
 //!    narrow, it searches in the frame of their neighbours (`rectified`). Where no corner is
 //!    visible but its edges are, these meet in it (`edge_crossing`). `effort` limits the searches per image.
-//! 3. `parts` joins parts on both sides of an occluder, where the map of a grid (`local_map`)
-//!    continues.
+//! 3. `parts` joins parts on both sides of an occluder, where the map of a grid (`local_map`), with rows and columns
+//!    that may be wide and narrow in turn (`spacing`), continues.
 //! 4. `grids` runs these, and removes duplicates and grids of the cells of tags.
 //! 5. `outline` fits a visible board. `untagged` distinguishes boards without tags from other patterns.
 
@@ -25,4 +25,5 @@ pub(crate) mod outline;
 pub(crate) mod parts;
 pub(crate) mod rectified;
 pub(crate) mod saddle_grid;
+pub(crate) mod spacing;
 pub(crate) mod untagged;

@@ -5,8 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec2;
 
-use super::local_map::{Bend, LocalMap};
+use super::local_map::{LocalMap, Shape};
 use super::saddle_grid::SaddleGrid;
+use super::spacing::Spacing;
 use crate::tiling::CHECKER;
 use deltille_core::lattice::{GridKind, LatticeMap, Vertex};
 
@@ -135,7 +136,8 @@ pub(crate) fn fit_rectangle(
     };
     let at = |v: Vertex| grid.get(&v).map(|placed| placed.position);
     let place = |v: Vertex| {
-        let predicted = || LocalMap::about::<CHECKER>(v, at, Bend::usual()).map(|map| map.place);
+        let shape = Shape::usual(Spacing::EQUAL);
+        let predicted = || LocalMap::about::<CHECKER>(v, at, shape).map(|map| map.place);
         at(v).or_else(predicted)
     };
     let keyed: Option<Vec<_>> = fitting

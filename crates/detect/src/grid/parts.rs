@@ -13,7 +13,7 @@ use glam::DVec2;
 use super::edge::{End, MAX_CHORD_RAD, is_clean};
 use super::effort::Effort;
 use super::links::MAX_CONTRAST_RATIO;
-use super::local_map::{Bend, LocalMap};
+use super::local_map::{LocalMap, Shape};
 use super::saddle_grid::{Growing, GrownSaddle};
 use crate::corners::buckets::Buckets;
 use crate::corners::saddles::Saddle;
@@ -70,13 +70,13 @@ pub(crate) fn join<const N: usize>(
     let mut joining = Joining { pyramid, saddles, places, grids, owners, effort };
     for base in order {
         while joining.grids[base].len() >= LEAST {
-            let bend = bend(&joining.grids[base]);
-            let candidates = joining.candidates(base, bend);
+            let shape = shape(&joining.grids[base]);
+            let candidates = joining.candidates(base, shape);
             if !joining.effort.spend(joining.grids[base].len() + candidates.len()) {
                 break;
             }
             // Nothing changes until a corner is added.
-            if !SIGMAS.into_iter().any(|sigma| joining.adopt(base, &candidates, bend, sigma)) {
+            if !SIGMAS.into_iter().any(|sigma| joining.adopt(base, &candidates, shape, sigma)) {
                 break;
             }
             has_grown[base] = true;
@@ -104,7 +104,7 @@ impl<const N: usize> Joining<'_, N> {
         &mut self,
         base: usize,
         candidates: &[(usize, Vertex)],
-        bend: Bend,
+        shape: Shape,
         sigma: f64,
     ) -> bool {
         let Self { pyramid, saddles, grids, owners, effort, .. } = self;
@@ -117,7 +117,7 @@ impl<const N: usize> Joining<'_, N> {
             if grids[base].contains_key(&vertex) {
                 continue;
             }
-            let Some(grown) = belongs(&grids[base], vertex, &saddles[index], bend, sigma) else {
+            let Some(grown) = belongs(&grids[base], vertex, &saddles[index], shape, sigma) else {
                 continue;
             };
             if !is_joined(pyramid, &grids[base], vertex, &grown) {
@@ -130,7 +130,7 @@ impl<const N: usize> Joining<'_, N> {
                     let map = LatticeMap::taking(kind::<N>(), from, vertex, turned as i32);
                     let is_worth =
                         effort.spend(grids[part].len() + owners.len() / CORNERS_IN_A_LOOK);
-                    if is_worth && is_part(&grids[base], &grids[part], map, bend, sigma) {
+                    if is_worth && is_part(&grids[base], &grids[part], map, shape, sigma) {
                         for (from, corner) in std::mem::take(&mut grids[part]) {
                             let turn = (corner.turn + turned) % N;
                             grids[base].insert(map.apply(from), GrownSaddle { turn, ..corner });
@@ -152,7 +152,7 @@ impl<const N: usize> Joining<'_, N> {
     }
 
     /// Returns saddle points near a vertex without a corner, each with that vertex, the nearest to the grid first.
-    fn candidates(&self, base: usize, bend: Bend) -> Vec<(usize, Vertex)> {
+    fn candidates(&self, base: usize, shape: Shape) -> Vec<(usize, Vertex)> {
         let grid = &self.grids[base];
         let Some((middle, reach_px)) = surroundings(grid) else {
             return Vec::new();
@@ -173,7 +173,7 @@ impl<const N: usize> Joining<'_, N> {
             };
             let map = maps
                 .entry(nearest)
-                .or_insert_with(|| LocalMap::about::<N>(nearest, at(grid), bend));
+                .or_insert_with(|| LocalMap::about::<N>(nearest, at(grid), shape));
             let Some(DVec2 { x: col, y: row }) = map.and_then(|map| map.steps_to(saddle.position))
             else {
                 continue;
@@ -194,9 +194,9 @@ fn at<const N: usize>(grid: &Growing<N>) -> impl Fn(Vertex) -> Option<DVec2> + C
     |v| grid.get(&v).map(|grown| grown.saddle.position)
 }
 
-fn bend<const N: usize>(grid: &Growing<N>) -> Bend {
+fn shape<const N: usize>(grid: &Growing<N>) -> Shape {
     let level = grid.values().map(|grown| grown.saddle.level).max().unwrap_or(0);
-    Bend::of::<N>(grid.keys().copied(), at(grid), level)
+    Shape::of::<N>(grid.keys().copied(), at(grid), level)
 }
 
 /// Returns a circle (centre and radius, px) around all positions that a grid predicts.
@@ -218,10 +218,10 @@ fn belongs<const N: usize>(
     grid: &Growing<N>,
     vertex: Vertex,
     saddle: &Saddle<N>,
-    bend: Bend,
+    shape: Shape,
     sigma: f64,
 ) -> Option<GrownSaddle<N>> {
-    let map = LocalMap::about::<N>(vertex, at(grid), bend).filter(|map| map.sigma <= sigma)?;
+    let map = LocalMap::about::<N>(vertex, at(grid), shape).filter(|map| map.sigma <= sigma)?;
     if map.distance::<N>(saddle.position)? > MAX_SIGMAS * map.sigma {
         return None;
     }
@@ -285,7 +285,7 @@ fn is_part<const N: usize>(
     grid: &Growing<N>,
     part: &Growing<N>,
     map: LatticeMap,
-    bend: Bend,
+    shape: Shape,
     sigma: f64,
 ) -> bool {
     part.iter().all(|(&from, corner)| {
@@ -294,7 +294,7 @@ fn is_part<const N: usize>(
             return false;
         }
         let predicted =
-            LocalMap::about::<N>(vertex, at(grid), bend).filter(|map| map.sigma <= sigma);
+            LocalMap::about::<N>(vertex, at(grid), shape).filter(|map| map.sigma <= sigma);
         predicted.is_none_or(|map| {
             let distance = map.distance::<N>(corner.saddle.position);
             distance.is_some_and(|distance| distance <= MAX_SIGMAS * map.sigma)

@@ -15,7 +15,8 @@ use std::f64::consts::PI;
 use glam::{DMat2, DVec2};
 
 use crate::grid::edge_crossing::Neighbour;
-use crate::grid::local_map::{Bend, LocalMap};
+use crate::grid::local_map::{LocalMap, Shape};
+use crate::grid::spacing::Spacing;
 use crate::tiling::{CHECKER, DELTILLE};
 use deltille_core::detection::{Grid, GridCorner};
 use deltille_core::family::Family;
@@ -29,6 +30,10 @@ const BLUR_MARGIN_SIGMAS: f64 = 2.0;
 /// Maximum distance of a corner from the chord of its neighbours, relative to the distance to them. Lenses bend an edge
 /// by less than 0.3 rad from one corner to the next.
 const MAX_SAG: f64 = 0.15;
+
+/// Minimum determinant of the second moments of displacements, in mean spacings, that are not collinear: with gaps of a
+/// tenth of a tag, two have 0.18² · 0.18²; collinear ones have zero.
+const MIN_SPREAD: f64 = 1e-4;
 
 /// Tiles by the id of their panel.
 type TilesOfPanels = BTreeMap<u32, BTreeSet<Tile>>;
@@ -190,23 +195,30 @@ pub(crate) fn surroundings_of(
     corners: impl Iterator<Item = usize>,
 ) -> Vec<Surroundings> {
     let places = Places::of(grid, scale);
-    let bend = LazyCell::new(|| places.bend(grid));
+    let shape = LazyCell::new(|| places.shape(grid));
+    let vertices = grid.corners.iter().map(|corner| Vertex::new(corner.row, corner.col));
+    let spacing = Spacing::of(grid.kind, vertices, |v| places.get(v));
     let around = |corner: &GridCorner| {
         let vertex = Vertex::new(corner.row, corner.col);
         let here = places.get(vertex)?;
         let seen = |step: Vertex| places.get(vertex + step).map(|place| place - here);
-        let near = affine(grid.kind.steps().iter().filter_map(|&s| Some((s, seen(s)?))));
+        let way = |step| spacing.way(vertex, step);
+        let near = affine(grid.kind.steps().iter().filter_map(|&s| Some((way(s), seen(s)?))));
         // For a single corner, the corners beyond its neighbours predict the positions of missing neighbours.
         let map = match &near {
             Some(_) => None,
-            None => Some(places.map_about(grid.kind, vertex, *bend)?),
+            None => Some(places.map_about(grid.kind, vertex, *shape)?),
         };
         let usual = |step| match &near {
-            Some(near) => near(step),
+            Some(near) => near(way(step)),
             None => map.map_or(DVec2::ZERO, |map| map.along(step)),
         };
-        let place = |step| seen(step).or_else(|| beyond(step, seen)).unwrap_or_else(|| usual(step));
-        let edges = edges(grid, &places, vertex, place);
+        let width = |from: Vertex, step| spacing.width(vertex + from, step);
+        let place =
+            |step| seen(step).or_else(|| beyond(step, seen, width)).unwrap_or_else(|| usual(step));
+        let mut edges = edges(grid, &places, vertex, place);
+        // Edges of a tile with a tag are the wide spacings.
+        edges.iter_mut().for_each(|edge| edge.across_px *= spacing.widest());
         let is_inner = grid.kind.steps().iter().all(|&step| seen(step).is_some());
         let neighbour = |&step| Neighbour { way: place(step), is_seen: seen(step).is_some() };
         let neighbours = grid.kind.steps().iter().map(neighbour).collect();
@@ -290,44 +302,45 @@ impl Places {
         *self.places.get(self.index(vertex)?)?
     }
 
-    fn bend(&self, grid: &Grid) -> Bend {
+    fn shape(&self, grid: &Grid) -> Shape {
         let vertices = grid.corners.iter().map(|corner| Vertex::new(corner.row, corner.col));
         match grid.kind {
-            GridKind::Deltille => Bend::of::<DELTILLE>(vertices, |v| self.get(v), 0),
-            GridKind::Checker => Bend::of::<CHECKER>(vertices, |v| self.get(v), 0),
+            GridKind::Deltille => Shape::of::<DELTILLE>(vertices, |v| self.get(v), 0),
+            GridKind::Checker => Shape::of::<CHECKER>(vertices, |v| self.get(v), 0),
         }
     }
 
-    fn map_about(&self, kind: GridKind, vertex: Vertex, bend: Bend) -> Option<LocalMap> {
+    fn map_about(&self, kind: GridKind, vertex: Vertex, shape: Shape) -> Option<LocalMap> {
         match kind {
-            GridKind::Deltille => LocalMap::about::<DELTILLE>(vertex, |v| self.get(v), bend),
-            GridKind::Checker => LocalMap::about::<CHECKER>(vertex, |v| self.get(v), bend),
+            GridKind::Deltille => LocalMap::about::<DELTILLE>(vertex, |v| self.get(v), shape),
+            GridKind::Checker => LocalMap::about::<CHECKER>(vertex, |v| self.get(v), shape),
         }
     }
 }
 
 /// Predicts an unseen vertex from the two opposite ones. Its distance is that of the first, reduced by as much as the
-/// first is nearer than the second.
-fn beyond(step: Vertex, seen: impl Fn(Vertex) -> Option<DVec2>) -> Option<DVec2> {
-    let back = Vertex::new(-step.row, -step.col);
+/// first is nearer than the second. The spacing gives the `width` of a step from a vertex.
+fn beyond(
+    step: Vertex,
+    seen: impl Fn(Vertex) -> Option<DVec2>,
+    width: impl Fn(Vertex, Vertex) -> f64,
+) -> Option<DVec2> {
+    let (here, back) = (Vertex::new(0, 0), Vertex::new(-step.row, -step.col));
     let (first, second) = (seen(back)?, seen(back + back)?);
-    let shrinks = first.length() / (second - first).length();
-    Some(-first * shrinks.min(1.0))
+    let [ahead, near, far] = [(here, step), (here, back), (back, back)].map(|(v, s)| width(v, s));
+    let shrinks = first.length() / near / ((second - first).length() / far);
+    Some(-first * (ahead / near) * shrinks.min(1.0))
 }
 
-/// Returns the affine map of lattice steps that fits best; `None` if they are collinear.
-fn affine(known: impl Iterator<Item = (Vertex, DVec2)>) -> Option<impl Fn(Vertex) -> DVec2> {
+/// Returns the affine map of displacements on the lattice that fits best; `None` if they are collinear.
+fn affine(known: impl Iterator<Item = (DVec2, DVec2)>) -> Option<impl Fn(DVec2) -> DVec2> {
     let (mut normal, mut right) = (DMat2::ZERO, [DVec2::ZERO; 2]);
-    for (step, place) in known {
-        let step = DVec2::new(step.row.into(), step.col.into());
-        normal += DMat2::from_cols(step.x * step, step.y * step);
-        right = [0, 1].map(|i| right[i] + place[i] * step);
+    for (way, place) in known {
+        normal += DMat2::from_cols(way.x * way, way.y * way);
+        right = [0, 1].map(|i| right[i] + place[i] * way);
     }
-    let rows = (normal.determinant() > 0.5).then(|| right.map(|r| normal.inverse() * r))?;
-    Some(move |v: Vertex| {
-        let v = DVec2::new(v.row.into(), v.col.into());
-        DVec2::from(rows.map(|row| row.dot(v)))
-    })
+    let rows = (normal.determinant() > MIN_SPREAD).then(|| right.map(|r| normal.inverse() * r))?;
+    Some(move |way: DVec2| DVec2::from(rows.map(|row| row.dot(way))))
 }
 
 /// Returns the edges through the corner at `vertex`, along the chords between its neighbours.
