@@ -5,7 +5,8 @@
 makes grids in FOLDER and renders their pages with poppler. OpenCV's ArUco detector must find every tag with its id and
 its corners. The corners that Kalibr computes from its target file must be those of the description. Exactly the dark
 squares of Kalibr's drawing must be dark. In synthetic photographs of a grid, `deltille detect` must find the visible
-corners at least with the precision of OpenCV. Needs numpy, OpenCV, PyYAML, pdftoppm and pdftocairo.
+corners at least with the precision of OpenCV, and in steep, small, blurred and colour photographs the fraction and the
+precision of `HARD`, with realistic covariances. Needs numpy, OpenCV, PyYAML, pdftoppm and pdftocairo.
 """
 
 import json
@@ -16,6 +17,7 @@ import cv2
 import numpy as np
 import yaml
 
+import exact
 from charuco import SCENES, WRONG_PX, run
 from photograph import Page, photograph
 
@@ -28,6 +30,16 @@ GRIDS = {
     "one-bit": ("--tags 5x4 --edge 30mm --gap 0.25 --tag-border 1 --first-id 100", ARUCO.DICT_APRILTAG_36h11),
     "small": ("--tags 3x2 --edge 50mm --gap 0.5 --family aprilTag25h9", ARUCO.DICT_APRILTAG_25h9),
 }
+
+# Photographs of Kalibr's grid, the least part of the corners, and the largest RMS error, px.
+HARD = [
+    ("45 degrees 4 px a bit", exact.Shot(tilt_deg=45, cell_px=4), 0.99, 0.008),
+    ("65 degrees 4 px a bit", exact.Shot(tilt_deg=65, cell_px=4), 0.95, 0.012),
+    ("45 degrees 2.5 px a bit", exact.Shot(tilt_deg=45, cell_px=2.5), 0.95, 0.012),
+    ("65 degrees 3 px a bit", exact.Shot(tilt_deg=65, cell_px=3), 0.90, 0.02),
+    ("blur of 2 px", exact.Shot(tilt_deg=30, cell_px=5, blur_px=2), 0.99, 0.02),
+    ("colour", exact.Shot(tilt_deg=30, cell_px=4, tone="srgb", mosaic=True), 0.99, 0.02),
+]
 
 
 def kalibr_corners(grid):
@@ -157,3 +169,4 @@ if __name__ == "__main__":
         target, grid = check(deltille, folder, name, options, dictionary)
         if number == 0:
             photographs(deltille, folder, name, target, grid, dictionary)
+            exact.hard_views(deltille, folder, name, folder / f"{name}.json", exact.aprilgrid(), HARD)

@@ -5,7 +5,8 @@
 makes boards in FOLDER with both of OpenCV's patterns and several dictionaries. OpenCV's detector must find every corner
 on the page with the id and the positions, in space and on the page, that the description states. OpenCV's own image of
 the board must show the same pattern. In synthetic photographs, `deltille detect` must find the visible corners at least
-with the precision of OpenCV. Needs numpy, OpenCV 4.8 or later, pdftoppm and pdftocairo.
+with the precision of OpenCV, and in steep, small and blurred photographs the fraction and the precision of `HARD`, with
+realistic covariances. Needs numpy, OpenCV 4.8 or later, pdftoppm and pdftocairo.
 """
 
 import json
@@ -16,6 +17,7 @@ import sys
 import cv2
 import numpy as np
 
+import exact
 from photograph import Page, Scene, photograph
 
 ARUCO = cv2.aruco
@@ -26,6 +28,7 @@ BOARDS = {
     "legacy": "--squares 8x6 --edge 30mm --marker 22mm --dictionary 5x5_100 --legacy",
     "odd": "--squares 7x5 --edge 25mm --dictionary 4x4_50 --first-id 7",
     "legacy-odd": "--squares 6x7 --edge 25mm --dictionary 6x6_250 --marker 15mm --legacy",
+    "narrow": "--squares 7x5 --edge 30mm --marker 24mm --dictionary 4x4_50",
     "april": "--squares 5x4 --edge 40mm --dictionary apriltag_36h11 --marker 32mm",
     "many": "--squares 23x16 --edge 12mm --dictionary 7x7_1000 --marker 9mm --first-id 800",
 }
@@ -38,6 +41,21 @@ SCENES = [
     Scene(tilt_deg=30, tone="srgb"),
     Scene(tilt_deg=60, tone="s-curve", noise=0.01, focal_px=1800.0),
 ]
+# Photographs of boards with wide and with narrow margins around markers, the least part of the corners, and the largest
+# RMS error, px.
+HARD = {
+    "usual": [
+        ("65 degrees 4 px a module", exact.Shot(tilt_deg=65, cell_px=4), 0.95, 0.008),
+        ("45 degrees 1.75 px a module", exact.Shot(tilt_deg=45, cell_px=1.75), 0.95, 0.02),
+        ("1.5 px a module", exact.Shot(cell_px=1.5), 0.95, 0.02),
+        ("blur of 2 px", exact.Shot(tilt_deg=45, cell_px=4, blur_px=2), 0.95, 0.015),
+    ],
+    "narrow": [
+        ("sRGB", exact.Shot(tilt_deg=30, cell_px=5, tone="srgb"), 0.99, 0.008),
+        ("2.5 px a module", exact.Shot(cell_px=2.5), 0.95, 0.012),
+        ("1.75 px a module", exact.Shot(cell_px=1.75), 0.95, 0.02),
+    ],
+}
 # Corners farther from their true position than this have a wrong label.
 WRONG_PX = 2.0
 
@@ -162,6 +180,9 @@ def main(deltille, folder):
         print(f"{name}: OpenCV finds all {count} corners on the page, within {worst:.3f} mm", flush=True)
         if name in PHOTOGRAPHED:
             print(f"{name}: in photographs: {photographs(deltille, folder, name, target, board)}", flush=True)
+        if name in HARD:
+            drawn = exact.charuco(board)
+            exact.hard_views(deltille, folder, name, folder / f"{name}.json", drawn, HARD[name])
 
 
 if __name__ == "__main__":

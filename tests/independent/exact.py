@@ -4,10 +4,12 @@
 
 Every dark square and every white cell of a tag is a quadrilateral in the picture. The area that it covers of every pixel is
 added up along its sides, at three times the resolution, then blurred and averaged over pixels. Nothing is sampled, so
-the positions of corners are exact, and a picture takes half a second. Uses no output of deltille.
+the positions of corners are exact, and a picture takes half a second. Pages are drawn without deltille.
 """
 
+import json
 import math
+import subprocess
 from dataclasses import dataclass
 
 import cv2
@@ -17,6 +19,8 @@ from photograph import demosaiced, tone_curve
 
 ARUCO = cv2.aruco
 FINE = 3
+# Range of the mean of squared errors over stated variances.
+LEAST_SHARE, MOST_SHARE = 0.5, 2.5
 
 
 def squares(corners, side):
@@ -25,7 +29,6 @@ def squares(corners, side):
 
 
 def bits_of(dictionary, index):
-    dictionary = ARUCO.getPredefinedDictionary(dictionary)
     return ARUCO.Dictionary.getBitsFromByteList(dictionary.bytesList[index : index + 1], dictionary.markerSize)
 
 
@@ -43,7 +46,7 @@ class Board:
 
 def aprilgrid(columns=6, rows=6, gap=0.3, border=2, dictionary=ARUCO.DICT_APRILTAG_36h11):
     """Kalibr's grid: rows of tags from the lower left; OpenCV has its tags rotated by 180°."""
-    board = Board()
+    board, dictionary = Board(), ARUCO.getPredefinedDictionary(dictionary)
     tag = len(bits_of(dictionary, 0)) + 2 * border
     step = tag * (1 + gap)
     for row in range(rows):
@@ -59,19 +62,20 @@ def aprilgrid(columns=6, rows=6, gap=0.3, border=2, dictionary=ARUCO.DICT_APRILT
     return board
 
 
-def charuco(columns=8, rows=6, marker=22 / 30, dictionary=ARUCO.DICT_5X5_100):
-    board, known = Board(), ARUCO.getPredefinedDictionary(dictionary)
-    cells = known.markerSize + 2
-    theirs = ARUCO.CharucoBoard((columns, rows), 1.0, marker, known)
-    square = cells / marker
+def charuco(theirs):
+    """OpenCV's board."""
+    board, known = Board(), theirs.getDictionary()
+    square = (known.markerSize + 2) / theirs.getMarkerLength() * theirs.getSquareLength()
+    scale = square / theirs.getSquareLength()
     tagged = set()
     for index, points in zip(theirs.getIds().ravel(), theirs.getObjPoints()):
-        at = np.array(points)[0, :2] * square
+        at = np.array(points)[0, :2] * scale
         tagged.add(tuple(np.floor(at / square + 1e-6).astype(int)))
-        board.add_tag(at, bits_of(dictionary, index), 1)
+        board.add_tag(at, bits_of(known, index), 1)
+    columns, rows = theirs.getChessboardSize()
     dark = [(c * square, r * square) for c in range(columns) for r in range(rows) if (c, r) not in tagged]
     board.dark.append(squares(dark, square))
-    board.corners = dict(enumerate(theirs.getChessboardCorners()[:, :2] * square))
+    board.corners = dict(enumerate(theirs.getChessboardCorners()[:, :2] * scale))
     return board
 
 
@@ -160,3 +164,59 @@ class Shot:
         seen = project(places) - 0.5
         inside = (seen > 3).all(1) & (seen < [self.width - 4, self.height - 4]).all(1)
         return image, {index: place for index, place, ok in zip(ids, seen, inside) if ok}
+
+
+@dataclass
+class Seen:
+    """What was found in some photographs, per coordinate."""
+
+    due: int = 0
+    squares: list = None
+    shares: list = None
+
+    def __str__(self):
+        return (
+            f"{len(self.squares)} of {self.due} corners, rms {self.rms():.4f} px, "
+            f"squared error over stated variance {np.mean(self.shares):.2f}"
+        )
+
+    def found(self):
+        return len(self.squares) / self.due
+
+    def rms(self):
+        return math.sqrt(np.mean(self.squares))
+
+
+# Corners farther from their true position than this have a wrong label, px.
+WRONG_PX = 2.0
+
+
+def examine(deltille, folder, target, board, shot, count):
+    """Corners that deltille finds in this number of photographs of a board; all must have a covariance."""
+    folder.mkdir(parents=True, exist_ok=True)
+    truths = {}
+    for number in range(count):
+        image, truths[str(number)] = shot.of(board, number)
+        cv2.imwrite(str(folder / f"{number}.png"), image)
+    command = [deltille, "detect", *sorted(folder.glob("*.png")), "--target", target, "-o", folder, "--force"]
+    subprocess.run([str(part) for part in command], check=True, capture_output=True)
+    seen = Seen(squares=[], shares=[])
+    for number, truth in truths.items():
+        seen.due += len(truth)
+        detection = json.loads((folder / f"{number}.json").read_text())
+        for corner in (corner for grid in detection["grids"] if grid["panel"] == 0 for corner in grid["corners"]):
+            error = np.array([corner["x"], corner["y"]]) - truth[corner["id"]]
+            assert np.hypot(*error) < WRONG_PX, f"{folder.name}, photograph {number}: {corner}"
+            xx, _, yy = corner["cov"]
+            seen.squares.append(np.mean(error**2))
+            seen.shares.append(np.mean(error**2 / [xx, yy]))
+    return seen
+
+
+def hard_views(deltille, folder, name, target, board, views):
+    """Examines views: a title, a shot, and the least part of corners and the largest RMS error that are accepted."""
+    for title, shot, least, most in views:
+        seen = examine(deltille, folder / f"{name}-{title.replace(' ', '-')}", target, board, shot, 3)
+        print(f"{name}: {title}: {seen}", flush=True)
+        assert seen.found() >= least and seen.rms() <= most, (title, str(seen))
+        assert LEAST_SHARE <= np.mean(seen.shares) <= MOST_SHARE, (title, str(seen))

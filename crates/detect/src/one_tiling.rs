@@ -6,6 +6,7 @@ use std::time::Duration;
 use super::config::DetectorConfig;
 use super::nothing_seen::nothing_found;
 use super::tiling::{CHECKER, DELTILLE, kind, step};
+use crate::corners::ring;
 use crate::corners::saddles::{SaddleFinder, too_many};
 use crate::grid::grids::grids;
 use crate::grid::saddle_grid::SaddleGrid;
@@ -13,12 +14,13 @@ use crate::grid::untagged::beyond::go_on;
 use crate::grid::untagged::tile_shape::{LARGE_INK, is_of_squares};
 use crate::labels::grid_labels::{FoundGrid, Labels, MAX_CORNERS, report_once};
 use crate::labels::placement::labeller::Budget;
-use crate::refine::clearance::TagAreas;
+use crate::refine::clearance::{TagAreas, surroundings};
 use crate::refine::edge_shift::{has_straight_edges, large_shift};
 use crate::refine::model::fitter::CornerFitter;
 use crate::refine::optics::Optics;
 use crate::refine::refine_grid::{Level, is_sampled, sharp_level};
 use crate::refine::refiner::Refiner;
+use crate::transformed::enlarged::enlarged_grids;
 use crate::transformed::foreshortened::foreshortened_grids;
 use crate::transformed::moved_edges::grids_of_moved_edges;
 use deltille_core::Clock;
@@ -27,6 +29,7 @@ use deltille_core::detection::{
 };
 use deltille_core::lattice::GridKind;
 use deltille_core::raster::{ImageView, Pyramid};
+use deltille_core::statistics::median;
 use deltille_core::targets::least_untagged_corners;
 
 /// Largest blur of an untagged grid, as a fraction of the edge length. At this blur, the next
@@ -276,6 +279,19 @@ impl OneTiling {
         let mut grids = self.plausible::<N>(frame, &found, &mut left_out);
         let of_found = left_out.len();
         timing.lap("labels");
+        if self.labels.are_wanted() && self.may_lack_corners(&grids) {
+            let found = enlarged_grids(finder, image, pyramid, self.labels.whole());
+            let mut larger = self.plausible::<N>(frame, &found, &mut Vec::new());
+            larger.retain(|(grid, _)| is_labelled(grid));
+            let corners = |grids: &Judged| -> usize {
+                let labelled = grids.iter().filter(|(grid, _)| is_labelled(grid));
+                labelled.map(|(grid, _)| grid.corners.len()).sum()
+            };
+            if corners(&larger) > corners(&grids) {
+                grids = larger;
+            }
+            timing.lap("enlarged");
+        }
         if grids.is_empty() && self.labels.are_wanted() {
             let found = foreshortened_grids(finder, pyramid);
             grids = self.plausible::<N>(frame, &found, &mut left_out);
@@ -304,6 +320,22 @@ impl OneTiling {
         let (grids, optics) = self.refined::<N>(frame, grids);
         timing.lap("refine");
         Found { grids, optics, left_out, saddles: saddles.len() }
+    }
+
+    /// Returns whether grids may lack corners because their tags are too near: none is labelled, or one that is does not
+    /// show a whole board, and the circle on which corners are searched for reaches the tags.
+    fn may_lack_corners(&self, grids: &Judged) -> bool {
+        let is_near = |grid: &Grid| {
+            let around = surroundings(grid, &self.tag_areas, 1.0);
+            let clear = around.iter().map(|around| around.clear_square_px(0.0)).collect();
+            median(clear).is_some_and(|clear_px| clear_px < ring::RADIUS as f64)
+        };
+        let mut labelled = grids.iter().map(|(grid, _)| grid).filter(|grid| is_labelled(grid));
+        let whole = self.labels.whole().map_or(usize::MAX, |whole| whole.corners());
+        match labelled.clone().count() {
+            0 => true,
+            _ => labelled.any(|grid| grid.corners.len() < whole && is_near(grid)),
+        }
     }
 
     /// Adds to each reason the settings with which the tags in its grid, one of `found`, would fit.

@@ -58,7 +58,7 @@ pub(super) const HALF_RING: [(isize, isize); 6] =
 pub(crate) const PER_AMPLITUDE: f32 = 4.5;
 
 /// Largest offset in [`HALF_RING`], px.
-pub(super) const RADIUS: usize = 4;
+pub(crate) const RADIUS: usize = 4;
 
 /// Pixels per block: a vector of 16-bit numbers. With twice as many, R would be computed for a
 /// third more pixels of a photograph.

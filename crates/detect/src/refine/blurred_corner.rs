@@ -392,6 +392,17 @@ impl<const NODES: usize> Orthant<NODES> {
             way: [0.0; 2],
         }
     }
+
+    /// Returns the part of the blurred light that comes from the positive sides of both edges.
+    pub(crate) fn quadrant(&self, h: [f32; 2]) -> Shade<2> {
+        let both = self.checker(h);
+        let single = |k: usize| SLOPE * bell(h[k]);
+        Shade {
+            f: 0.25 * (1.0 + erf_sqrt_half(h[0]) + erf_sqrt_half(h[1]) + both.f),
+            slopes: [0, 1].map(|k| 0.25 * (single(k) + both.slopes[k])),
+            ..both
+        }
+    }
 }
 
 /// exp(−h²/2).

@@ -17,6 +17,7 @@ use glam::{DMat2, DVec2};
 use crate::grid::edge_crossing::Neighbour;
 use crate::grid::local_map::{LocalMap, Shape};
 use crate::grid::spacing::Spacing;
+use crate::refine::model::window::Border;
 use crate::tiling::{CHECKER, DELTILLE};
 use deltille_core::detection::{Grid, GridCorner};
 use deltille_core::family::Family;
@@ -35,63 +36,72 @@ const MAX_SAG: f64 = 0.15;
 /// tenth of a tag, two have 0.18² · 0.18²; collinear ones have zero.
 const MIN_SPREAD: f64 = 1e-4;
 
-/// Tiles by the id of their panel.
-type TilesOfPanels = BTreeMap<u32, BTreeSet<Tile>>;
+/// Distances from the edges of a tile to parts of its tag, measured along the adjacent edges, in edge lengths.
+#[derive(Clone, Copy, Debug, Default)]
+struct Insets {
+    /// To the visible tag.
+    tag: f64,
+    /// To its cells: the area between them is a border of one colour.
+    cells: f64,
+}
 
-/// The tiles of a target with tags, and the area of the tag in its tile.
+/// The tiles of a panel with tags, and the area of the tag in its tile.
+#[derive(Clone, Debug)]
+struct TagsOfPanel {
+    tiles: BTreeSet<Tile>,
+    insets: Insets,
+}
+
+/// The tiles of targets with tags, and the area of the tag in its tile.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TagAreas {
-    /// Distance from the edges of a tile to the visible tag, measured along the adjacent edges, in
-    /// edge lengths. It is the minimum over all panels.
-    inset: f64,
-    /// Tiles with a tag, by panel id, for each target; with its name if there are several.
-    targets: Vec<(Option<String>, TilesOfPanels)>,
+    /// Panels with tags by id, for each target; with its name if there are several.
+    targets: Vec<(Option<String>, BTreeMap<u32, TagsOfPanel>)>,
 }
 
 impl TagAreas {
     /// Returns the tag areas of `target` with the tags of this family.
     pub(crate) fn of(target: &Target, family: &Family) -> Self {
-        let tagged = || target.panels.iter().filter(|panel| !panel.tags.is_empty());
-        let inset = |panel: &Panel| {
-            let at = match panel.tags_in {
-                TagsIn::Black => panel.tag_inset_bits(),
-                TagsIn::White => panel.tag_margin_bits(),
+        let tagged = target.panels.iter().filter(|panel| !panel.tags.is_empty());
+        let tags = |panel: &Panel| {
+            let width = family.cells().width(panel.tag_inset_bits());
+            let cells = panel.tag_inset_bits() / width;
+            let tag = match panel.tags_in {
+                TagsIn::Black => cells,
+                TagsIn::White => panel.tag_margin_bits() / width,
             };
-            at / family.cells().width(panel.tag_inset_bits())
+            let tiles = panel.tags.iter().map(|tag| panel.tag_tile(tag)).collect();
+            (panel.id, TagsOfPanel { tiles, insets: Insets { tag, cells } })
         };
-        let tiles = |panel: &Panel| panel.tags.iter().map(|tag| panel.tag_tile(tag)).collect();
-        Self {
-            inset: tagged().map(inset).fold(f64::INFINITY, f64::min),
-            targets: vec![(None, tagged().map(|panel| (panel.id, tiles(panel))).collect())],
-        }
+        Self { targets: vec![(None, tagged.map(tags).collect())] }
     }
 
     /// Returns the tag areas of several targets, by their names.
     pub(crate) fn of_scene(targets: impl IntoIterator<Item = (String, Self)>) -> Self {
-        let mut all = Self { inset: f64::INFINITY, targets: Vec::new() };
-        for (name, of_target) in targets {
-            all.inset = all.inset.min(of_target.inset);
-            let tiles = of_target.targets.into_iter();
-            all.targets.extend(tiles.map(|(_, tiles)| (Some(name.clone()), tiles)));
-        }
-        all
+        let named = |(name, of_target): (String, Self)| {
+            let panels = of_target.targets.into_iter();
+            panels.map(move |(_, panels)| (Some(name.clone()), panels))
+        };
+        Self { targets: targets.into_iter().flat_map(named).collect() }
     }
 
     /// Returns whether no tile shows a tag.
     pub(crate) fn is_empty(&self) -> bool {
-        self.targets.iter().all(|(_, tiles)| tiles.is_empty())
+        self.targets.iter().all(|(_, panels)| panels.is_empty())
     }
 
-    /// Returns whether a tile of a grid may show a tag: as on its panel, or any suitable tile if the panel is unknown.
-    fn has(&self, grid: &Grid, tile: Tile) -> bool {
-        match grid.panel {
-            Some(panel) => {
-                let of_target = self.targets.iter().find(|(name, _)| *name == grid.target);
-                let tiles = of_target.and_then(|(_, tiles)| tiles.get(&panel));
-                tiles.is_some_and(|tiles| tiles.contains(&tile))
-            }
-            None => !self.is_empty() && tile == tile.kind().tag_tile(tile.anchor),
-        }
+    /// Returns the area of the tag that a tile of a grid may show: as on its panel, or in any suitable tile the largest
+    /// one if the panel is unknown.
+    fn of_tile(&self, grid: &Grid, tile: Tile) -> Option<Insets> {
+        let Some(panel) = grid.panel else {
+            let tags = self.targets.iter().flat_map(|(_, panels)| panels.values());
+            let inset = tags.map(|panel| panel.insets.tag).reduce(f64::min)?;
+            let is_suitable = tile == tile.kind().tag_tile(tile.anchor);
+            return is_suitable.then_some(Insets { tag: inset, cells: inset });
+        };
+        let (_, panels) = self.targets.iter().find(|(name, _)| *name == grid.target)?;
+        let tags = panels.get(&panel).filter(|tags| tags.tiles.contains(&tile))?;
+        Some(tags.insets)
     }
 }
 
@@ -108,6 +118,10 @@ pub(crate) struct Surroundings {
     sides: Vec<Line>,
     /// Sides of the tags, positive outside.
     tags: Vec<Vec<Line>>,
+    /// Sides of the cells of the tags, positive outside.
+    cells: Vec<Vec<Line>>,
+    /// Borders of the tags that lie in tiles of the opposite colour.
+    pub borders: Vec<Border>,
     /// Edges through the corner by increasing angle; empty if nothing is known.
     pub edges: Vec<Edge>,
     /// Its neighbours, counter-clockwise on the print; those outside the grid are predicted. Empty if
@@ -151,11 +165,12 @@ impl Surroundings {
     }
 
     /// Returns a predicate for positions, px from the corner: whether no tag is visible there under a blur of this
-    /// standard deviation, px.
-    pub(crate) fn off_tags(&self, blur_px: f64) -> impl Fn(DVec2) -> bool {
+    /// standard deviation, px; or only its border, if `with_borders`.
+    pub(crate) fn off_tags(&self, blur_px: f64, with_borders: bool) -> impl Fn(DVec2) -> bool {
         let margin = BLUR_MARGIN_SIGMAS * blur_px;
-        let circle2 = (self.distance_of_tags(DVec2::ZERO) - margin).max(0.0).powi(2);
-        move |place| place.length_squared() < circle2 || self.distance_of_tags(place) >= margin
+        let areas = if with_borders { &self.cells } else { &self.tags };
+        let circle2 = (distance_of(areas, DVec2::ZERO) - margin).max(0.0).powi(2);
+        move |place| place.length_squared() < circle2 || distance_of(areas, place) >= margin
     }
 
     /// Returns half the side of the largest clear square around the corner, px, under a blur of this standard
@@ -169,15 +184,15 @@ impl Surroundings {
     fn distance(&self, place: DVec2) -> f64 {
         let sides = self.sides.iter().map(|[a, b, c]| a * place.x + b * place.y + c);
         let nearest = sides.reduce(f64::min).unwrap_or(0.0);
-        nearest.min(self.distance_of_tags(place))
+        nearest.min(distance_of(&self.tags, place))
     }
+}
 
-    /// Returns a lower bound of the distance from a point to the nearest tag, px.
-    fn distance_of_tags(&self, DVec2 { x: u, y: v }: DVec2) -> f64 {
-        let from = |[a, b, c]: &Line| a * u + b * v + c;
-        let outside = |tag: &Vec<Line>| tag.iter().map(from).fold(f64::NEG_INFINITY, f64::max);
-        self.tags.iter().map(outside).fold(f64::INFINITY, f64::min)
-    }
+/// Returns a lower bound of the distance from a point to the nearest of some areas, px.
+fn distance_of(areas: &[Vec<Line>], DVec2 { x: u, y: v }: DVec2) -> f64 {
+    let from = |[a, b, c]: &Line| a * u + b * v + c;
+    let outside = |area: &Vec<Line>| area.iter().map(from).fold(f64::NEG_INFINITY, f64::max);
+    areas.iter().map(outside).fold(f64::INFINITY, f64::min)
 }
 
 /// Returns the surroundings of every corner of a grid, in order, in pixels of `scale` times the size of the grid's
@@ -232,8 +247,21 @@ pub(crate) fn surroundings_of(
                     found.sides.push(line(polygon[i], polygon[j], DVec2::ZERO));
                 }
             }
-            if tags.has(grid, tile) {
-                found.tags.push(outline(&polygon, tags.inset));
+            if let Some(Insets { tag, cells }) = tags.of_tile(grid, tile) {
+                found.tags.push(outline(&inner(&polygon, tag)));
+                found.cells.push(outline(&inner(&polygon, cells)));
+                let corner = |&step: &Vertex| {
+                    let map = || places.map_about(grid.kind, vertex + step, *shape);
+                    seen(step).or_else(|| Some(map()?.place - here))
+                };
+                let seen: Option<Vec<DVec2>> = corners.iter().map(corner).collect();
+                let first = corners.iter().position(|&corner| corner == Vertex::new(0, 0));
+                if cells > tag
+                    && let Some(Ok(mut tile)) = seen.map(<[DVec2; 4]>::try_from)
+                {
+                    tile.rotate_left(first.unwrap_or_default());
+                    found.borders.extend(border(tile, tag));
+                }
             }
         }
         Some(found)
@@ -402,15 +430,33 @@ fn bend([a, b, c]: [DVec2; 3]) -> f64 {
     if bend.is_finite() { bend } else { 0.0 }
 }
 
-/// Returns the sides of the visible tag in a tile, positive outside.
-fn outline(tile: &[DVec2], inset: f64) -> Vec<Line> {
+/// Returns the corners of the area in a tile at this distance from its edges, in edge lengths.
+fn inner(tile: &[DVec2], inset: f64) -> Vec<DVec2> {
     let n = tile.len();
     // Every corner moves along both edges that meet there.
     let corner = |i: usize| {
         let (here, next, last) = (tile[i], tile[(i + 1) % n], tile[(i + n - 1) % n]);
         here + inset * (next + last - 2.0 * here)
     };
-    let corners: Vec<DVec2> = (0..n).map(corner).collect();
+    (0..n).map(corner).collect()
+}
+
+/// Returns the corners of a square in a square tile at this distance from its edges, in edge lengths, under perspective.
+/// Returns `None` if three corners of the tile are collinear.
+fn border([p0, p1, p2, p3]: [DVec2; 4], inset: f64) -> Option<Border> {
+    let (first, second, rest) = (p1 - p2, p3 - p2, p0 - p1 + p2 - p3);
+    let determinant = first.perp_dot(second);
+    let nearer = DVec2::new(rest.perp_dot(second), first.perp_dot(rest)) / determinant;
+    let (along, beside) = (p1 - p0 + nearer.x * p1, p3 - p0 + nearer.y * p3);
+    let (near, far) = (inset, 1.0 - inset);
+    let corners = [[near, near], [far, near], [far, far], [near, far]]
+        .map(|[u, v]| (p0 + u * along + v * beside) / (1.0 + u * nearer.x + v * nearer.y));
+    corners.iter().all(|corner| corner.is_finite()).then_some(corners)
+}
+
+/// Returns the sides of an area with these corners, positive outside.
+fn outline(corners: &[DVec2]) -> Vec<Line> {
+    let n = corners.len();
     let middle = corners.iter().sum::<DVec2>() / n as f64;
     let sides = (0..n).map(|i| line(corners[i], corners[(i + 1) % n], middle));
     sides.map(|side| side.map(|c| -c)).collect()
@@ -486,8 +532,9 @@ mod tests {
         let grid = grid(GridKind::Checker, |place| {
             DVec2::new(100.0 + 40.0 * place.x, 300.0 - 40.0 * place.y)
         });
-        let tags =
-            TagAreas { inset: 0.25, targets: vec![(None, BTreeMap::from([(0, BTreeSet::new())]))] };
+        let insets = Insets { tag: 0.25, cells: 0.25 };
+        let panel = TagsOfPanel { tiles: BTreeSet::new(), insets };
+        let tags = TagAreas { targets: vec![(None, BTreeMap::from([(0, panel)]))] };
         let around = &surroundings(&grid, &tags, 1.0)[12];
         // Cells begin 10 px from both edges; the blur reaches 2 px.
         let off_tags = around.off_tags(1.0);

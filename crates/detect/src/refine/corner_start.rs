@@ -12,7 +12,6 @@ use glam::DVec2;
 use multiversion::multiversion;
 
 use super::model::corner::Corner;
-use super::model::window::Window;
 use crate::lanes;
 use crate::lanes::LANES;
 use deltille_core::raster::ImageView;
@@ -43,11 +42,11 @@ const MIN_START_BLUR_PX: f64 = 0.6;
 /// centre.
 const MAX_START_BLUR: f64 = 0.5;
 
-/// Returns the start values of a corner from the pixels of a window. The edges have these
+/// Returns the start values of a corner from the pixels at these columns and rows of a window. The edges have these
 /// directions, increasing within 180°, under a blur of `blur_px`. Returns `None` if the window
 /// shows only one side of the edges.
 pub(crate) fn start_along<const K: usize>(
-    window: &Window,
+    places: [&[f32]; 2],
     pixels: &[f32],
     position: DVec2,
     angles: [f64; K],
@@ -56,8 +55,8 @@ pub(crate) fn start_along<const K: usize>(
     let offset = (position - position.round()).as_vec2().to_array();
     let directions = angles.map(|angle| [angle.cos() as f32, angle.sin() as f32]);
     let sums = match K {
-        2 => sums_of_two(window.places(), pixels, offset, &directions),
-        _ => sums_of_three(window.places(), pixels, offset, &directions),
+        2 => sums_of_two(places, pixels, offset, &directions),
+        _ => sums_of_three(places, pixels, offset, &directions),
     };
     let [plus, minus] = sums.map(|[sum, count]| f64::from(sum / count));
     let (level, amplitude) = ((plus + minus) / 2.0, (plus - minus) / 2.0);

@@ -19,6 +19,7 @@ use super::model::window::Patch;
 use super::optics::Optics;
 use super::refiner::{
     MIN_MODEL_RADIUS, MIN_PIXELS, ModelFit, Refined, Refinement, Refiner, Room, Sharpness,
+    USUAL_MIN_PIXELS,
 };
 use super::shared_optics::{REACH_PX, REACH_SIGMAS, SAMPLES};
 use crate::grid::edge_crossing::EdgeCrossing;
@@ -126,16 +127,24 @@ impl Refiner {
                 places.push((order, clear_px, blur_px, grid.corners[i], around));
             }
         }
-        places.retain(|(_, clear_px, ..)| *clear_px >= MIN_MODEL_RADIUS as f64);
         places.sort_by(|a, b| b.1.total_cmp(&a.1));
         // Those with the most room lie where the board is nearest, and the light may differ elsewhere.
-        places.truncate(SAMPLES.max(places.len() / 2));
+        let roomy =
+            places.partition_point(|(_, clear_px, ..)| *clear_px >= MIN_MODEL_RADIUS as f64);
+        places.truncate(SAMPLES.max(roomy / 2));
+        let sharpness = |blur_px: f64| Sharpness { blur_px, optics: &self.known };
+        // The clear area of others is no square.
+        let mut index = 0..;
+        places.retain(|(_, _, blur_px, corner, around)| {
+            let room = self.near(around, sharpness(*blur_px));
+            let is_roomy = index.next().is_some_and(|i| i < roomy);
+            is_roomy || self.window(image, corner.position(), room).count() >= USUAL_MIN_PIXELS
+        });
         places.sort_by_key(|(order, ..)| *order);
         let count = places.len();
         let taken = (0..count.min(SAMPLES)).map(|i| &places[i * count / SAMPLES.min(count)]);
         let samples = taken.filter_map(|(_, _, blur_px, corner, around)| {
-            let as_known = Sharpness { blur_px: *blur_px, optics: &self.known };
-            let room = self.near(around, as_known);
+            let room = self.near(around, sharpness(*blur_px));
             let place = corner.position();
             let fit = self.model(fitter, image, place, room, None)?;
             let window = self.window(image, place, room).into_owned();
@@ -214,13 +223,24 @@ impl Refiner {
         limit: f64,
         sharpness: Sharpness,
     ) {
-        let around = surroundings(grid, tags, 1.0);
-        let fits = each(fits.len(), |fitter, i| {
-            let fit = fits[i].as_ref()?;
-            let room = self.whole(&around[i], sharpness);
-            let bent = self.model(fitter, image, fit.position(), room, Some(fit));
-            bent.filter(|fit| fit.residual <= limit).or(Some(*fit))
-        });
+        let again = |around: &[Surroundings], fits: &[Option<ModelFit>]| {
+            each(fits.len(), |fitter, i| {
+                let fit = fits[i].as_ref()?;
+                let room = self.whole(&around[i], sharpness);
+                let bent = self.model(fitter, image, fit.position(), room, Some(fit));
+                bent.filter(|fit| fit.residual <= limit).or(Some(*fit))
+            })
+        };
+        let mut around = surroundings(grid, tags, 1.0);
+        let mut fits = again(&around, fits);
+        if around.iter().any(|around| !around.borders.is_empty()) {
+            // The corners determine where the borders of tags are.
+            for (corner, fit) in grid.corners.iter_mut().zip(&fits) {
+                corner.move_to(fit.map_or(corner.position(), |fit| fit.position()));
+            }
+            around = surroundings(grid, tags, 1.0);
+            fits = again(&around, &fits);
+        }
         let noises = fits.iter().flatten().map(ModelFit::noise).collect();
         let usual = median(noises).unwrap_or(0.0);
         let blurs: BTreeMap<Vertex, f64> = grid

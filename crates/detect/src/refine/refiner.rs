@@ -36,6 +36,9 @@ use deltille_core::raster::ImageView;
 /// Minimum radius of the window of the model, px: 49 pixels for ten unknowns.
 pub(crate) const MIN_MODEL_RADIUS: usize = 3;
 
+/// Number of pixels of that window.
+pub(crate) const USUAL_MIN_PIXELS: usize = (2 * MIN_MODEL_RADIUS + 1).pow(2);
+
 /// Minimum number of pixels for the model: three for each unknown, so that the noise is measurable.
 pub(crate) const MIN_PIXELS: usize = 30;
 
@@ -160,8 +163,21 @@ impl Room<'_> {
             let [first, last] = self.around.span(v + off.y, self.blur_px);
             [(first - off.x).max(-pixel.x), (last - off.x).min(right - pixel.x)]
         };
-        let is_off_tags = self.around.off_tags(self.blur_px);
-        Window::within(radius, span, |place| is_off_tags(place + off))
+        let within = |with_borders: bool| {
+            let is_off_tags = self.around.off_tags(self.blur_px, with_borders);
+            Window::within(radius, span, |place| is_off_tags(place + off))
+        };
+        let (window, borders) = (within(false), &self.around.borders);
+        let least_beside = USUAL_MIN_PIXELS / 4;
+        let is_beside_enough =
+            |border| window.count_beside(border, position - pixel) >= least_beside;
+        if borders.is_empty()
+            || window.count() >= USUAL_MIN_PIXELS && borders.iter().all(is_beside_enough)
+        {
+            return window;
+        }
+        // The print may differ from the target, so borders of tags are only read if too little is visible without them.
+        within(true).with_borders(borders)
     }
 
     /// Returns half the side of the largest clear square, px.
@@ -398,7 +414,12 @@ impl Refiner {
             Some(fit) => (fit.corner.with_edges(), Accuracy::Full),
             None => {
                 let pixels = fitter.pixels(image, window, position)?;
-                (start_along(window, pixels, position, angles, room.blur_px)?, Accuracy::Rough)
+                let off = window.off_borders(pixels, position - position.round());
+                let (places, pixels) = match &off {
+                    Some([us, vs, pixels]) => ([&us[..], &vs[..]], &pixels[..]),
+                    None => (window.places(), pixels),
+                };
+                (start_along(places, pixels, position, angles, room.blur_px)?, Accuracy::Rough)
             }
         };
         let edges = first.angles.map(|angle_rad| edge_along(edges, angle_rad));

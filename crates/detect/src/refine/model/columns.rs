@@ -2,6 +2,7 @@
 
 use multiversion::multiversion;
 
+use super::beside::Beside;
 use super::corner::{AMPLITUDE, ANGLE, Corner, LEVEL, LN_BLUR, PARAMS, SLOPE, X, Y};
 use super::look::Look;
 use super::window::{MAX_PIXELS, Window};
@@ -30,11 +31,18 @@ pub(super) const ALL: usize = (TONE + TONE_PARAMS).next_multiple_of(4);
 /// One row for each parameter, then the residual; one column for each pixel.
 pub(super) type Columns = [[f32; MAX_PIXELS]; ALL];
 
+/// The pixels of a window, and what the surroundings of its corner change in them.
+#[derive(Clone, Copy)]
+pub(super) struct Shown<'a> {
+    pub(super) pixels: &'a [f32; MAX_PIXELS],
+    pub(super) beside: &'a Beside,
+}
+
 /// Fills the columns of a corner in window coordinates. Includes those of the shared parameters if it is fitted
 /// `JOINT`ly.
 pub(super) fn fill_columns<const K: usize, const JOINT: bool>(
     columns: &mut Columns,
-    pixels: &[f32; MAX_PIXELS],
+    shown: Shown,
     window: &Window,
     corner: &Corner<K>,
     look: &Look<K>,
@@ -43,19 +51,19 @@ pub(super) fn fill_columns<const K: usize, const JOINT: bool>(
     if K == 2 {
         let is_square = look.correlations[0].rho.abs() <= FEW_NODES_RHO;
         match (look.way.is_some() || look.is_inked() || JOINT, is_square) {
-            (true, true) => fill_any_square::<K, JOINT>(columns, pixels, window, corner, look),
-            (true, false) => fill_any_checker::<K, JOINT>(columns, pixels, window, corner, look),
-            (false, true) => fill_square::<K, JOINT>(columns, pixels, window, corner, look),
-            (false, false) => fill_checker::<K, JOINT>(columns, pixels, window, corner, look),
+            (true, true) => fill_any_square::<K, JOINT>(columns, shown, window, corner, look),
+            (true, false) => fill_any_checker::<K, JOINT>(columns, shown, window, corner, look),
+            (false, true) => fill_square::<K, JOINT>(columns, shown, window, corner, look),
+            (false, false) => fill_checker::<K, JOINT>(columns, shown, window, corner, look),
         }
     } else {
         match (look.way, look.is_inked()) {
             (Some(way), _) => {
                 let way = std::array::from_fn(|k| way.get(k).copied().unwrap_or(0.0));
-                fill_swept_deltille::<K, JOINT>(columns, pixels, window, corner, look, way);
+                fill_swept_deltille::<K, JOINT>(columns, shown, window, corner, look, way);
             }
-            (None, true) => fill_inked_deltille::<K, JOINT>(columns, pixels, window, corner, look),
-            (None, false) => fill_deltille::<K, JOINT>(columns, pixels, window, corner, look),
+            (None, true) => fill_inked_deltille::<K, JOINT>(columns, shown, window, corner, look),
+            (None, false) => fill_deltille::<K, JOINT>(columns, shown, window, corner, look),
         }
     }
 }
@@ -63,32 +71,32 @@ pub(super) fn fill_columns<const K: usize, const JOINT: bool>(
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn fill_checker<const C: usize, const JOINT: bool>(
     columns: &mut Columns,
-    pixels: &[f32; MAX_PIXELS],
+    shown: Shown,
     window: &Window,
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
     let still = Orthant::new(look.correlations[0].rho);
     if look.has_halo() {
-        fill::<2, C, JOINT, _>(columns, pixels, window, corner, look, look.haloed(still));
+        fill::<2, C, JOINT, _>(columns, shown, window, corner, look, look.haloed(still));
     } else {
-        fill::<2, C, JOINT, _>(columns, pixels, window, corner, look, still);
+        fill::<2, C, JOINT, _>(columns, shown, window, corner, look, still);
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn fill_square<const C: usize, const JOINT: bool>(
     columns: &mut Columns,
-    pixels: &[f32; MAX_PIXELS],
+    shown: Shown,
     window: &Window,
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
     let still = Orthant::of_few_nodes(look.correlations[0].rho);
     if look.has_halo() {
-        fill::<2, C, JOINT, _>(columns, pixels, window, corner, look, look.haloed(still));
+        fill::<2, C, JOINT, _>(columns, shown, window, corner, look, look.haloed(still));
     } else {
-        fill::<2, C, JOINT, _>(columns, pixels, window, corner, look, still);
+        fill::<2, C, JOINT, _>(columns, shown, window, corner, look, still);
     }
 }
 
@@ -96,32 +104,32 @@ fn fill_square<const C: usize, const JOINT: bool>(
 #[multiversion(targets("x86_64+avx2"))]
 fn fill_any_checker<const C: usize, const JOINT: bool>(
     columns: &mut Columns,
-    pixels: &[f32; MAX_PIXELS],
+    shown: Shown,
     window: &Window,
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
     let still = Orthant::new(look.correlations[0].rho);
-    fill_any::<C, JOINT, 6>(columns, pixels, window, corner, look, still);
+    fill_any::<C, JOINT, 6>(columns, shown, window, corner, look, still);
 }
 
 /// The same for edges that are nearly square.
 #[multiversion(targets("x86_64+avx2"))]
 fn fill_any_square<const C: usize, const JOINT: bool>(
     columns: &mut Columns,
-    pixels: &[f32; MAX_PIXELS],
+    shown: Shown,
     window: &Window,
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
     let still = Orthant::of_few_nodes(look.correlations[0].rho);
-    fill_any::<C, JOINT, 3>(columns, pixels, window, corner, look, still);
+    fill_any::<C, JOINT, 3>(columns, shown, window, corner, look, still);
 }
 
 #[inline(always)]
 fn fill_any<const C: usize, const JOINT: bool, const NODES: usize>(
     columns: &mut Columns,
-    pixels: &[f32; MAX_PIXELS],
+    shown: Shown,
     window: &Window,
     corner: &Corner<C>,
     look: &Look<C>,
@@ -131,58 +139,58 @@ fn fill_any<const C: usize, const JOINT: bool, const NODES: usize>(
     let Some(way) = look.way.map(|way| [way[0], way[1]]) else {
         if has_halo {
             let pattern = look.haloed_of(|by| look.parted(still, by));
-            fill::<2, C, JOINT, _>(columns, pixels, window, corner, look, pattern);
+            fill::<2, C, JOINT, _>(columns, shown, window, corner, look, pattern);
         } else {
             let pattern = look.parted(still, 1.0);
-            fill::<2, C, JOINT, _>(columns, pixels, window, corner, look, pattern);
+            fill::<2, C, JOINT, _>(columns, shown, window, corner, look, pattern);
         }
         return;
     };
     let swept =
         |by: f32| SweptChecker { pattern: look.parted(still, by), way: [way[0] * by, way[1] * by] };
     if has_halo {
-        fill::<2, C, JOINT, _>(columns, pixels, window, corner, look, look.haloed_of(swept));
+        fill::<2, C, JOINT, _>(columns, shown, window, corner, look, look.haloed_of(swept));
     } else {
-        fill::<2, C, JOINT, _>(columns, pixels, window, corner, look, swept(1.0));
+        fill::<2, C, JOINT, _>(columns, shown, window, corner, look, swept(1.0));
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn fill_deltille<const C: usize, const JOINT: bool>(
     columns: &mut Columns,
-    pixels: &[f32; MAX_PIXELS],
+    shown: Shown,
     window: &Window,
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
     let still = Deltille;
     if JOINT || look.has_halo() {
-        fill::<3, C, JOINT, _>(columns, pixels, window, corner, look, look.haloed(still));
+        fill::<3, C, JOINT, _>(columns, shown, window, corner, look, look.haloed(still));
     } else {
-        fill::<3, C, JOINT, _>(columns, pixels, window, corner, look, still);
+        fill::<3, C, JOINT, _>(columns, shown, window, corner, look, still);
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn fill_inked_deltille<const C: usize, const JOINT: bool>(
     columns: &mut Columns,
-    pixels: &[f32; MAX_PIXELS],
+    shown: Shown,
     window: &Window,
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
     let inked = look.inked(Deltille);
     if JOINT || look.has_halo() {
-        fill::<3, C, JOINT, _>(columns, pixels, window, corner, look, look.haloed(inked));
+        fill::<3, C, JOINT, _>(columns, shown, window, corner, look, look.haloed(inked));
     } else {
-        fill::<3, C, JOINT, _>(columns, pixels, window, corner, look, inked);
+        fill::<3, C, JOINT, _>(columns, shown, window, corner, look, inked);
     }
 }
 
 #[multiversion(targets("x86_64+avx2"))]
 fn fill_swept_deltille<const C: usize, const JOINT: bool>(
     columns: &mut Columns,
-    pixels: &[f32; MAX_PIXELS],
+    shown: Shown,
     window: &Window,
     corner: &Corner<C>,
     look: &Look<C>,
@@ -191,11 +199,11 @@ fn fill_swept_deltille<const C: usize, const JOINT: bool>(
     let swept = |by: f32| SweptDeltille::new(way.map(|way| way * by));
     if look.is_inked() {
         let pattern = look.inked(look.haloed_of(swept));
-        fill::<3, C, JOINT, _>(columns, pixels, window, corner, look, pattern);
+        fill::<3, C, JOINT, _>(columns, shown, window, corner, look, pattern);
     } else if JOINT || look.has_halo() {
-        fill::<3, C, JOINT, _>(columns, pixels, window, corner, look, look.haloed_of(swept));
+        fill::<3, C, JOINT, _>(columns, shown, window, corner, look, look.haloed_of(swept));
     } else {
-        fill::<3, C, JOINT, _>(columns, pixels, window, corner, look, swept(1.0));
+        fill::<3, C, JOINT, _>(columns, shown, window, corner, look, swept(1.0));
     }
 }
 
@@ -203,12 +211,13 @@ fn fill_swept_deltille<const C: usize, const JOINT: bool>(
 #[inline(always)]
 fn fill<const K: usize, const C: usize, const JOINT: bool, P: Pattern<K>>(
     columns: &mut Columns,
-    pixels: &[f32; MAX_PIXELS],
+    shown: Shown,
     window: &Window,
     corner: &Corner<C>,
     look: &Look<C>,
     pattern: P,
 ) {
+    let Shown { pixels, beside } = shown;
     let [x, y] = corner.position.as_vec2().to_array();
     // Directions of the edges, in units of the blur across them.
     let sines: [f32; K] = std::array::from_fn(|k| (look.rotations[k].0 * look.sharpness[k]) as f32);
@@ -249,7 +258,13 @@ fn fill<const K: usize, const C: usize, const JOINT: bool, P: Pattern<K>>(
         let h: [f32; K] = std::array::from_fn(|k| {
             cosines[k] * dv - sines[k] * du - 0.5 * bends[k] * along[k] * along[k] - moved[k]
         });
-        let Shade { f, slopes, correlations, halo, shifts, way } = pattern.at(h);
+        let Shade { mut f, slopes, correlations, halo, shifts, way } = pattern.at(h);
+        let (mut by_x, mut by_y, mut by_scale) = (0.0, 0.0, 0.0);
+        // Only squares have tags with a border of the opposite colour.
+        if K == 2 {
+            f += beside.f[i];
+            (by_x, by_y) = (beside.by_position[0][i], beside.by_position[1][i]);
+        }
         let change = gu * u + gv * v;
         let gain = 1.0 + change;
         let shade = f * gain + change * piece.ratio;
@@ -258,7 +273,6 @@ fn fill<const K: usize, const C: usize, const JOINT: bool, P: Pattern<K>>(
         let seen = if model > low && model < high { 1.0 } else { 0.0 };
         let by_shade = amplitude * steepness * seen;
         let light = by_shade * gain;
-        let (mut by_x, mut by_y, mut by_scale) = (0.0, 0.0, 0.0);
         for k in 0..K {
             let bent = bends[k] * along[k];
             by_x += slopes[k] * (sines[k] + bent * cosines[k]);

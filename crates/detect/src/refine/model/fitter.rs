@@ -3,7 +3,8 @@
 use glam::DVec2;
 use nalgebra::{SMatrix, SVector};
 
-use super::columns::{ALL, Columns, fill_columns};
+use super::beside::Beside;
+use super::columns::{ALL, Columns, Shown, fill_columns};
 use super::corner::{ANGLE, Corner, LN_BLUR, MIN_BLUR_PX, PARAMS, SLOPE, X, Y};
 use super::look::Look;
 use super::sums::{ends, products, squares};
@@ -109,6 +110,8 @@ pub(crate) struct CornerFitter {
     /// Values at which the sensor clipped pixels of the window, or infinite values if it clipped
     /// none.
     pub(super) limits: [f32; 2],
+    /// What borders of tags change.
+    beside: Box<Beside>,
 }
 
 impl Default for CornerFitter {
@@ -117,6 +120,7 @@ impl Default for CornerFitter {
             pixels: Box::new([0.0; MAX_PIXELS]),
             columns: Box::new([[0.0; MAX_PIXELS]; ALL]),
             limits: UNLIMITED,
+            beside: Box::default(),
         }
     }
 }
@@ -336,7 +340,9 @@ impl CornerFitter {
         piece: Piece,
     ) {
         let look = Look::of(corner, optics, piece, self.limits);
-        fill_columns::<K, JOINT>(&mut self.columns, &self.pixels, window, corner, &look);
+        self.beside.fill(window, corner, optics);
+        let shown = Shown { pixels: &self.pixels, beside: &self.beside };
+        fill_columns::<K, JOINT>(&mut self.columns, shown, window, corner, &look);
     }
 }
 

@@ -33,10 +33,11 @@
 //! equations of a corner and the parameters that it shares with others.
 //!
 //! 1. `window` contains the pixels that are read.
-//! 2. `corner` contains the parameters; `look` the effect of the optics on them.
+//! 2. `corner` contains the parameters; `look` the effect of the optics on them, `beside` the borders of tags nearby.
 //! 3. `columns` contains the model and its derivatives for each pixel, `sums` the normal equations.
 //! 4. `fitter` descends to the minimum; `joint` gives the equations for all corners of an image together.
 
+pub(crate) mod beside;
 pub(crate) mod columns;
 pub(crate) mod corner;
 pub(crate) mod fitter;

@@ -12,6 +12,17 @@ pub(crate) const MAX_RADIUS: usize = 15;
 pub(super) const MAX_PIXELS: usize =
     ((2 * MAX_RADIUS + 1) * (2 * MAX_RADIUS + 1)).next_multiple_of(LANES);
 
+/// The corners of the border of a tag in a tile beside the corner, px from the corner, the nearest first. Its colour is
+/// opposite to that of the tile.
+pub(crate) type Border = [DVec2; 4];
+
+/// Returns whether a displacement from the apex lies in the quadrant that two sides of a border span there.
+fn is_beyond([first, second, _, last]: &Border, off: DVec2) -> bool {
+    let (along, beside) = (*second - *first, *last - *first);
+    let turn = along.perp_dot(beside).signum();
+    turn * along.perp_dot(off) > 0.0 && turn * off.perp_dot(beside) > 0.0
+}
+
 /// Pixels around a corner, relative to the centre pixel.
 #[derive(Clone, Debug)]
 pub(crate) struct Window {
@@ -23,6 +34,8 @@ pub(crate) struct Window {
     pub(super) v: Vec<f32>,
     /// Runs of adjacent pixels: the first, and their number.
     pub(super) runs: Vec<([i32; 2], usize)>,
+    /// Borders of tags that are visible.
+    pub(super) borders: Vec<Border>,
 }
 
 impl Window {
@@ -51,6 +64,7 @@ impl Window {
             u: Vec::with_capacity(room),
             v: Vec::with_capacity(room),
             runs: Vec::with_capacity(2 * radius + 1),
+            borders: Vec::new(),
         };
         for v in -reach..=reach {
             let [first, last] = span(f64::from(v));
@@ -86,6 +100,34 @@ impl Window {
     /// Returns columns and rows of the pixels.
     pub(crate) fn places(&self) -> [&[f32]; 2] {
         [&self.u[..self.count], &self.v[..self.count]]
+    }
+
+    /// Returns the window with these borders of tags.
+    pub(crate) fn with_borders(self, borders: &[Border]) -> Self {
+        Self { borders: borders.to_vec(), ..self }
+    }
+
+    /// Returns the number of pixels in the tile of a border, for a corner at this offset from the centre pixel.
+    pub(crate) fn count_beside(&self, border: &Border, offset: DVec2) -> usize {
+        let [us, vs] = self.places();
+        let places = us.iter().zip(vs).map(|(&u, &v)| DVec2::new(u.into(), v.into()));
+        places.filter(|&place| is_beyond(border, place - offset)).count()
+    }
+
+    /// Returns the columns, rows and values of the pixels that show no border of a tag, for a corner at this offset from
+    /// the centre pixel. Returns `None` if no border is visible.
+    pub(crate) fn off_borders(&self, pixels: &[f32], offset: DVec2) -> Option<[Vec<f32>; 3]> {
+        if self.borders.is_empty() {
+            return None;
+        }
+        let mut off: [Vec<f32>; 3] = Default::default();
+        for ((&u, &v), &pixel) in self.u.iter().zip(&self.v).zip(pixels) {
+            let place = DVec2::new(u.into(), v.into()) - offset;
+            if !self.borders.iter().any(|border| is_beyond(border, place - border[0])) {
+                off.iter_mut().zip([u, v, pixel]).for_each(|(values, value)| values.push(value));
+            }
+        }
+        Some(off)
     }
 
     /// Reads the pixels around `centre`; full scale is 1. Returns `None` if one lies outside the
