@@ -281,15 +281,8 @@ impl OneTiling {
         timing.lap("labels");
         if self.labels.are_wanted() && self.may_lack_corners(&grids) {
             let found = enlarged_grids(finder, image, pyramid, self.labels.whole());
-            let mut larger = self.plausible::<N>(frame, &found, &mut Vec::new());
-            larger.retain(|(grid, _)| is_labelled(grid));
-            let corners = |grids: &Judged| -> usize {
-                let labelled = grids.iter().filter(|(grid, _)| is_labelled(grid));
-                labelled.map(|(grid, _)| grid.corners.len()).sum()
-            };
-            if corners(&larger) > corners(&grids) {
-                grids = larger;
-            }
+            let found = self.plausible::<N>(frame, &found, &mut Vec::new());
+            grids = with_larger_panels(grids, found);
             timing.lap("enlarged");
         }
         if grids.is_empty() && self.labels.are_wanted() {
@@ -430,10 +423,7 @@ impl OneTiling {
             is_confirmed(grid) || corners <= MAX_CORNERS
         });
         left_out.extend((grids.len() < count).then(|| Reason::new(ReasonKind::TooManyGrids, [])));
-        // Labelled grids by panel, then the others; a stable sort keeps the largest first.
-        grids.sort_by_cached_key(|(grid, _)| {
-            (grid.panel.is_none(), grid.target.clone(), grid.panel.unwrap_or(u32::MAX))
-        });
+        sort_by_panel(&mut grids);
         grids
     }
 
@@ -539,6 +529,36 @@ fn is_confirmed(grid: &Grid) -> bool {
 /// Returns whether a grid is confirmed by tags or as a whole board.
 fn is_labelled(grid: &Grid) -> bool {
     is_confirmed(grid) || grid.panel.is_some()
+}
+
+/// Sorts labelled grids by panel, then the others; a stable sort keeps the largest first.
+fn sort_by_panel(grids: &mut Judged) {
+    grids.sort_by_cached_key(|(grid, _)| {
+        (grid.panel.is_none(), grid.target.clone(), grid.panel.unwrap_or(u32::MAX))
+    });
+}
+
+/// Returns for each panel its grids from the list that shows more of its corners. Unlabelled grids are only kept if no
+/// panel has gained corners, because they may show parts of those that have.
+fn with_larger_panels(grids: Judged, mut others: Judged) -> Judged {
+    let panel = |grid: &Grid| (grid.target.clone(), grid.panel);
+    let corners = |grids: &Judged| {
+        let mut corners = BTreeMap::new();
+        for (grid, _) in grids.iter().filter(|(grid, _)| is_labelled(grid)) {
+            *corners.entry(panel(grid)).or_insert(0) += grid.corners.len();
+        }
+        corners
+    };
+    let (before, after) = (corners(&grids), corners(&others));
+    let has_gained = |grid: &Grid| after.get(&panel(grid)) > before.get(&panel(grid));
+    others.retain(|(grid, _)| is_labelled(grid) && has_gained(grid));
+    if others.is_empty() {
+        return grids;
+    }
+    let kept = grids.into_iter().filter(|(grid, _)| is_labelled(grid) && !has_gained(grid));
+    others.extend(kept);
+    sort_by_panel(&mut others);
+    others
 }
 
 fn refiner(kind: GridKind, config: DetectorConfig, edge_mm: Option<f64>) -> Refiner {

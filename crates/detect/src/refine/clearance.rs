@@ -537,7 +537,7 @@ mod tests {
         let tags = TagAreas { targets: vec![(None, BTreeMap::from([(0, panel)]))] };
         let around = &surroundings(&grid, &tags, 1.0)[12];
         // Cells begin 10 px from both edges; the blur reaches 2 px.
-        let off_tags = around.off_tags(1.0);
+        let off_tags = around.off_tags(1.0, false);
         let clear = |u: f64, v: f64| {
             let [first, last] = around.span(v, 1.0);
             (first..=last).contains(&u) && off_tags(DVec2::new(u, v))
@@ -546,5 +546,21 @@ mod tests {
         assert!(!clear(12.0, 12.0) && !clear(9.0, 20.0) && !clear(39.0, 0.0));
         let square_px = (10.0 - 2.0) * std::f64::consts::FRAC_1_SQRT_2;
         assert!((around.clear_square_px(1.0) - square_px).abs() < 1e-9);
+    }
+
+    #[test]
+    fn borders_follow_perspective() {
+        let image = |DVec2 { x, y }: DVec2| {
+            let depth = 1.0 + 0.3 * x - 0.2 * y;
+            DVec2::new(30.0 * (x - 0.2 * y) / depth, -25.0 * y / depth)
+        };
+        let square = |low: f64, high: f64| {
+            [[low, low], [high, low], [high, high], [low, high]].map(|at| image(at.into()))
+        };
+        let found = border(square(0.0, 1.0), 0.2).unwrap();
+        for (found, seen) in found.iter().zip(square(0.2, 0.8)) {
+            assert!(found.abs_diff_eq(seen, 1e-9), "{found} {seen}");
+        }
+        assert_eq!(border([DVec2::ZERO, DVec2::X, 2.0 * DVec2::X, 3.0 * DVec2::X], 0.2), None);
     }
 }

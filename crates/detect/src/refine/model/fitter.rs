@@ -377,6 +377,7 @@ pub(super) fn with_prior<const K: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::refine::model::window::Border;
     use deltille_core::raster::Gray;
 
     /// A corner off the centre of its window, in uneven light, with curved edges.
@@ -439,14 +440,46 @@ mod tests {
         }
     }
 
+    /// The borders of tags in two tiles that meet diagonally at [`corner`], 4 px from its edges.
+    fn borders() -> [Border; 2] {
+        let [along, beside] = [0.4, 1.5].map(DVec2::from_angle);
+        [1.0, -1.0].map(|side| {
+            [[4.0, 4.0], [16.0, 4.0], [16.0, 16.0], [4.0, 16.0]]
+                .map(|[a, b]| side * (a * along + b * beside))
+        })
+    }
+
+    #[test]
+    fn borders_move_with_their_corner() {
+        for (optics, amplitude) in optics().iter().zip([0.35, -0.35]) {
+            let corner = corner::<2>(amplitude);
+            let window = Window::new(8).with_borders(&borders());
+            let mut fitter = CornerFitter::default();
+            let piece = optics.piece(corner.level, corner.amplitude);
+            fitter.fill::<2, false>(&window, &corner, optics, piece);
+            for (parameter, way) in [(X, DVec2::X), (Y, DVec2::Y)] {
+                let [after, before] = [4e-3, -4e-3].map(|by| {
+                    let position = corner.position + by * way;
+                    shown(&window, &Corner { position, ..corner }, optics)
+                });
+                let column = &fitter.columns[parameter][..window.count];
+                let scale = column.iter().fold(0.0f32, |most, by| most.max(by.abs()));
+                for ((by, after), before) in column.iter().zip(after).zip(before) {
+                    let off = (by - (after - before) / 8e-3).abs();
+                    assert!(off < 2e-3 * scale, "{parameter}: {by} {after} {before}");
+                }
+            }
+        }
+    }
+
     /// From a start near the corner, the fit to a rendered model finds every parameter and leaves
     /// no residual.
     #[test]
     fn a_corner_is_recovered_from_its_own_image() {
-        fn check<const K: usize>(truth: &Corner<K>, optics: &Optics) {
+        fn check<const K: usize>(truth: &Corner<K>, optics: &Optics, borders: &[Border]) {
             const MIDDLE: usize = 12;
-            let window = Window::new(9);
-            let whole = Window::new(MIDDLE);
+            let window = Window::new(9).with_borders(borders);
+            let whole = Window::new(MIDDLE).with_borders(borders);
             let pixels = shown(&whole, truth, optics);
             let side = 2 * MIDDLE + 1;
             let picture = Gray::from_fn(side, side, |x, y| pixels[y * side + x]);
@@ -477,8 +510,9 @@ mod tests {
             }
         }
         for (optics, amplitude) in optics().iter().zip([0.35, -0.35]) {
-            check::<2>(&corner(amplitude), optics);
-            check::<3>(&corner(amplitude), optics);
+            check::<2>(&corner(amplitude), optics, &[]);
+            check::<2>(&corner(amplitude), optics, &borders());
+            check::<3>(&corner(amplitude), optics, &[]);
         }
     }
 }
