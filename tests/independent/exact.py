@@ -2,9 +2,9 @@
 
     image, truth = Shot(tilt_deg=65, cell_px=4).of(aprilgrid(6, 6, 0.3), seed=3)
 
-Every dark square and every white cell of a tag is a quadrilateral in the picture. The area that it covers of every pixel is
+Every dark square and every white cell of a tag is a quadrilateral in the image. The area of every pixel that it covers is
 added up along its sides, at three times the resolution, then blurred and averaged over pixels. Nothing is sampled, so
-the positions of corners are exact, and a picture takes half a second. Pages are drawn without deltille.
+the positions of corners are exact, and an image takes half a second. Pages are drawn without deltille.
 """
 
 import json
@@ -168,7 +168,7 @@ class Shot:
 
 @dataclass
 class Seen:
-    """What was found in some photographs, per coordinate."""
+    """Corners found in some photographs: squared errors per axis, and the same over the stated variances."""
 
     due: int = 0
     squares: list = None
@@ -214,7 +214,7 @@ def examine(deltille, folder, target, board, shot, count):
 
 
 def hard_views(deltille, folder, name, target, board, views):
-    """Examines views: a title, a shot, and the least part of corners and the largest RMS error that are accepted."""
+    """Checks views: a title, a shot, and the least part of corners and the largest RMS error that are accepted."""
     for title, shot, least, most in views:
         seen = examine(deltille, folder / f"{name}-{title.replace(' ', '-')}", target, board, shot, 3)
         print(f"{name}: {title}: {seen}", flush=True)

@@ -1,4 +1,4 @@
-//! What borders of tags beside a corner change in its window.
+//! Effect of the borders of tags beside a corner on its window.
 //!
 //! A tag in a white tile has a black border. In small tiles it is visible near the corner: a square whose edges are
 //! parallel to those of the corner, at distances that the target states. The blurred square is added to the pattern of

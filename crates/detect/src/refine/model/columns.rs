@@ -31,7 +31,7 @@ pub(super) const ALL: usize = (TONE + TONE_PARAMS).next_multiple_of(4);
 /// One row for each parameter, then the residual; one column for each pixel.
 pub(super) type Columns = [[f32; MAX_PIXELS]; ALL];
 
-/// The pixels of a window, and what the surroundings of its corner change in them.
+/// The pixels of a window, and the effect of borders of tags on them.
 #[derive(Clone, Copy)]
 pub(super) struct Shown<'a> {
     pub(super) pixels: &'a [f32; MAX_PIXELS],

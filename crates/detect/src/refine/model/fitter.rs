@@ -110,7 +110,7 @@ pub(crate) struct CornerFitter {
     /// Values at which the sensor clipped pixels of the window, or infinite values if it clipped
     /// none.
     pub(super) limits: [f32; 2],
-    /// What borders of tags change.
+    /// Effect of the borders of tags.
     beside: Box<Beside>,
 }
 
