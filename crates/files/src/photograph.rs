@@ -1,6 +1,7 @@
 //! Reading photographs in common formats as grey images.
 //!
-//! Metadata does not change the pixels:
+//! Colours become the grey values that their sensor measured, if the file still contains them, else luma. Metadata does
+//! not change the pixels:
 //!
 //! - pixels stay in sensor orientation; the EXIF orientation is recorded but not applied, as in COLMAP and in
 //!   OpenCV with `IMREAD_IGNORE_ORIENTATION`;
@@ -27,7 +28,7 @@ use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
 use crate::limits::{self, Exceeded, Limits};
-use deltille_core::raster::{AnyGray, FileNotes, Gray};
+use deltille_core::raster::{AnyGray, FileNotes, Gray, measured};
 use deltille_core::setting::Setting::{LimitsMaxPixels, PhotographReadWithNotes};
 
 /// Maximum size of decompressed metadata in a PNG (profiles and texts), bytes.
@@ -142,7 +143,7 @@ pub fn grey_of_colours(width: u32, height: u32, rgb: Vec<u8>) -> Option<Gray<u8>
 }
 
 /// Reads a PNG, JPEG, TIFF, BMP, PGM/PPM or WebP file as a grey image in sensor orientation. Colour
-/// becomes luma (Rec. 709 weights), transparency is ignored, and a depth beyond 8 bits is kept as
+/// becomes the values that a Bayer sensor [`measured`], or luma (Rec. 709 weights). Transparency is ignored, and a depth beyond 8 bits is kept as
 /// 16 bits.
 ///
 /// The format is recognised by the content, not by the name.
@@ -474,9 +475,20 @@ fn pages(source: impl BufRead + Seek) -> tiff::TiffResult<usize> {
 
 fn from_dynamic(image: DynamicImage) -> AnyGray {
     use DynamicImage::{
-        ImageLuma16, ImageLumaA16, ImageRgb16, ImageRgb32F, ImageRgba16, ImageRgba32F,
+        ImageLuma16, ImageLumaA16, ImageRgb8, ImageRgb16, ImageRgb32F, ImageRgba8, ImageRgba16,
+        ImageRgba32F,
     };
     let (width, height) = (image.width() as usize, image.height() as usize);
+    let of_sensor = match &image {
+        ImageRgb8(image) => measured::<_, 3>(width, height, image.as_raw()).map(AnyGray::U8),
+        ImageRgba8(image) => measured::<_, 4>(width, height, image.as_raw()).map(AnyGray::U8),
+        ImageRgb16(image) => measured::<_, 3>(width, height, image.as_raw()).map(AnyGray::U16),
+        ImageRgba16(image) => measured::<_, 4>(width, height, image.as_raw()).map(AnyGray::U16),
+        _ => None,
+    };
+    if let Some(grey) = of_sensor {
+        return grey;
+    }
     let deep = matches!(
         image,
         ImageLuma16(_)

@@ -1,6 +1,6 @@
 //! Grey values of colours.
 
-use super::Gray;
+use super::{Gray, measured};
 
 /// Weights of red, green and blue (Rec. 709), in ten-thousandths.
 const WEIGHTS: [u32; 3] = [2126, 7152, 722];
@@ -8,7 +8,7 @@ const WEIGHTS: [u32; 3] = [2126, 7152, 722];
 /// Sum of the weights.
 const WHOLE: u32 = 10_000;
 
-/// Converts colours to grey values. Each pixel has `BYTES` bytes; the first three are red, green
+/// Converts colours to grey values: the [`measured`] ones of a Bayer sensor, else their luma. Each pixel has `BYTES` bytes; the first three are red, green
 /// and blue, as in a video frame. The values equal those of a photograph with these colours, within
 /// 1 of 256 levels. Returns
 /// `None` if the number of bytes does not match the width and height.
@@ -26,6 +26,9 @@ pub fn grey_of_colours<const BYTES: usize>(
     colours: &[u8],
 ) -> Option<Gray<u8>> {
     let (width, height) = (width as usize, height as usize);
+    if let Some(grey) = measured::<u8, BYTES>(width, height, colours) {
+        return Some(grey);
+    }
     let grey = |pixel: &[u8; BYTES]| {
         let sum = WEIGHTS.iter().zip(pixel).map(|(weight, &value)| weight * u32::from(value));
         ((sum.sum::<u32>() + WHOLE / 2) / WHOLE) as u8
