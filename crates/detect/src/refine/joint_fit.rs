@@ -8,7 +8,7 @@ use super::model::corner::{Corner, OWN};
 use super::model::fitter::CornerFitter;
 use super::model::joint::{Common, Joint};
 use super::model::window::Patch;
-use super::optics::{HALO, INK, INK_UNIT, MIN_MOTION, Optics, PARAMS};
+use super::optics::{HALO, INK, INK_UNIT, MIN_MOTION, Optics, PARAMS, SKEWNESS};
 use super::significance::Estimate;
 use super::small_systems::solved;
 use deltille_core::damping::Damping;
@@ -21,8 +21,9 @@ const MIN_HALO: f64 = -0.45;
 
 /// Prior standard deviations of the parameters. Gamma 2.6 has (1.6, 0, 0), and S-shaped curves have
 /// −0.5 at both ends. Halos of 0.5 are strong. A blur twice as wide in one direction has an
-/// astigmatism of 0.6. Ink that spreads by 2 % of an edge covers a fifth of the bits of a tag.
-const PRIOR: [f64; PARAMS] = [2.0, 1.0, 1.0, 0.3, 0.3, 0.5, 2.0];
+/// astigmatism of 0.6. Edges along the diagonals that are blurred by half more
+/// have a cross of 0.4. A plane of red filters, reduced by half, has a skewness of 0.6. Ink that spreads by 2 % of an edge covers a fifth of the bits of a tag.
+const PRIOR: [f64; PARAMS] = [2.0, 1.0, 1.0, 0.3, 0.3, 0.3, 0.3, 0.3, 0.5, 2.0];
 
 /// Maximum step of the parameters.
 const MAX_STEP: f64 = 2.0;
@@ -46,6 +47,9 @@ const ROUGHLY_CONVERGED: f64 = 0.5;
 /// else.
 const MAX_RESIDUAL_RATIO: f64 = 3.0;
 
+/// Minimum number of corners in excess of the parameters whose scatter counts: it is known to within a factor of 1.6.
+const LEAST_FREE: usize = 5;
+
 /// A corner in the joint fit, in image coordinates.
 #[derive(Clone, Debug)]
 pub(crate) struct Sample {
@@ -64,7 +68,8 @@ impl Optics {
             0..TONE_PARAMS => Common::Tone { parameter, moved: Box::new(self.moved(parameter)) },
             HALO => Common::Halo,
             INK => Common::Ink,
-            _ => Common::Astigmatism(parameter - TONE_PARAMS),
+            SKEWNESS.. => Common::Skewness(parameter - SKEWNESS),
+            _ => Common::Shape(parameter - TONE_PARAMS),
         }
     }
 }
@@ -439,7 +444,7 @@ fn covariance(reduced: &Reduced) -> Option<DMatrix<f64>> {
     let inverse = reduced.matrix.clone().cholesky()?.inverse();
     let members = reduced.own.iter().flatten().count();
     let count = reduced.gradient.len();
-    if members <= 2 * count {
+    if members < count + LEAST_FREE {
         // With so few corners, the scatter is as uncertain as the noise that it corrects.
         return Some(inverse);
     }

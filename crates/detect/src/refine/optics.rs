@@ -5,8 +5,13 @@ use super::blurred_corner::PLACES_OF_FOUR;
 use deltille_core::detection::InkEstimate;
 use deltille_core::detection::{Curve, Piece, TONE_PARAMS, Tone, ToneEstimate};
 
-/// Number of parameters: three of the tone curve, two of the astigmatism, the halo, and the ink.
-pub(super) const PARAMS: usize = TONE_PARAMS + 4;
+/// Number of parameters: three of the tone curve, two of the astigmatism, the cross, two of the skewness, the halo, and
+/// the ink.
+pub(super) const PARAMS: usize = TONE_PARAMS + 7;
+/// Index of the cross.
+pub(super) const CROSS: usize = TONE_PARAMS + 2;
+/// Index of the first skewness.
+pub(super) const SKEWNESS: usize = CROSS + 1;
 /// Index of the halo.
 pub(super) const HALO: usize = PARAMS - 2;
 /// Index of the ink.
@@ -26,8 +31,11 @@ const MIN_CORE: f64 = 0.3;
 /// Unit of the ink, in edges.
 pub(crate) const INK_UNIT: f64 = 0.01;
 
-/// Maximum astigmatism: the difference of the squared blur in one direction from the mean of both, relative to that
-/// mean.
+/// Maximum skewness. Beyond it, the expansion of an edge by its skewness is not monotonic within its blur.
+const MAX_SKEWNESS: f64 = 1.0;
+
+/// Maximum astigmatism with the cross: the difference of the squared blur in one direction from the mean of all,
+/// relative to that mean.
 const MAX_ASTIGMATISM: f64 = 0.98;
 
 /// The parameters that the corners of an image share.
@@ -43,6 +51,12 @@ pub(crate) struct Optics {
     pub(super) range: [f64; 2],
     /// Astigmatism: e₁, e₂ of the shape M = (1 + e₁, e₂; e₂, 1 − e₁) of the squared blur.
     pub astigmatism: [f64; 2],
+    /// Cross: the squared blur across an edge at the angle θ is larger by c cos 4θ. Interpolation between the pixels of
+    /// a colour filter, sharpening and JPEG treat rows and columns alike, but not diagonals.
+    pub cross: f64,
+    /// Skewness of the blur along rows and columns: third cumulants relative to the cube of the blur. A picture reduced
+    /// after demosaicing has them, because the filters occupy fixed places in each of its pixels.
+    pub skewness: [f64; 2],
     /// Whether the astigmatism is motion blur along a line instead of a Gaussian.
     pub is_motion: bool,
     /// Strength of the halo, and its width relative to the blur.
@@ -71,6 +85,8 @@ impl Default for Optics {
             params: [0.0; TONE_PARAMS],
             range: [0.0, 1.0],
             astigmatism: [0.0; 2],
+            cross: 0.0,
+            skewness: [0.0; 2],
             is_motion: false,
             halo: [0.0, HALO_WIDTH],
             ink: 0.0,
@@ -194,7 +210,7 @@ impl Optics {
 
     /// Returns the smallest blur over all directions, relative to the mean blur.
     pub(crate) fn narrowest(&self) -> f64 {
-        (1.0 - self.stretch()).sqrt()
+        (1.0 - self.stretch() - self.cross.abs()).sqrt()
     }
 
     /// Returns the blur of the pattern without halo, relative to the blur of a pattern without halo whose edges have
@@ -232,11 +248,14 @@ impl Optics {
     }
 
     pub(super) fn vector(&self) -> [f64; PARAMS] {
-        let ([p1, p2, p3], [e1, e2]) = (self.params, self.astigmatism);
-        [p1, p2, p3, e1, e2, self.halo[0], self.ink]
+        let ([p1, p2, p3], [e1, e2], [g1, g2]) = (self.params, self.astigmatism, self.skewness);
+        [p1, p2, p3, e1, e2, self.cross, g1, g2, self.halo[0], self.ink]
     }
 
-    pub(super) fn with(&self, &[p1, p2, p3, e1, e2, halo, ink]: &[f64; PARAMS]) -> Self {
+    pub(super) fn with(
+        &self,
+        &[p1, p2, p3, e1, e2, cross, g1, g2, halo, ink]: &[f64; PARAMS],
+    ) -> Self {
         let params = [p1, p2, p3];
         let curve = match params {
             same if same == self.params => self.curve.clone(),
@@ -244,11 +263,13 @@ impl Optics {
             [0.0, 0.0, 0.0] => None,
             _ => Some(Curve::estimated(params, self.range)),
         };
-        let long = (e1.hypot(e2) / MAX_ASTIGMATISM).max(1.0);
+        let long = ((e1.hypot(e2) + cross.abs()) / MAX_ASTIGMATISM).max(1.0);
         Self {
             curve,
             params,
             astigmatism: [e1 / long, e2 / long],
+            cross: cross / long,
+            skewness: [g1, g2].map(|g| g.clamp(-MAX_SKEWNESS, MAX_SKEWNESS)),
             halo: [halo, self.halo[1]],
             ink,
             ..self.clone()

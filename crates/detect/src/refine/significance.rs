@@ -2,16 +2,17 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::optics::{HALO, INK, PARAMS};
+use super::optics::{CROSS, HALO, INK, PARAMS, SKEWNESS};
 use deltille_core::detection::TONE_PARAMS;
 
 /// Groups of parameters that are used together.
-const GROUPS: [&[usize]; 4] = [&[0, 1, 2], &[3, 4], &[HALO], &[INK]];
+const GROUPS: [&[usize]; 6] =
+    [&[0, 1, 2], &[3, 4], &[CROSS], &[SKEWNESS, SKEWNESS + 1], &[HALO], &[INK]];
 
 /// χ² thresholds of three, two and one degrees of freedom: a group is used if noise exceeds its threshold with a
 /// probability below 1 : 1000. Astigmatism is used from 1 : 10, because every image is blurred
 /// slightly more in one direction. At a grazing angle, this resembles a tone curve.
-const CHI2: [f64; 4] = [16.3, 4.6, 10.8, 10.8];
+const CHI2: [f64; 6] = [16.3, 4.6, 10.8, 13.8, 10.8, 10.8];
 
 /// Threshold of one degree of freedom, 1 : 1000.
 const CHI2_OF_ONE: f64 = 10.8;

@@ -16,14 +16,16 @@ use deltille_core::detection::TONE_PARAMS;
 pub(super) const RISE: usize = PARAMS + 1;
 /// S.
 pub(super) const SHADE: usize = PARAMS + 2;
-/// Derivatives with respect to the two parameters of astigmatism.
-pub(super) const ASTIGMATISM: usize = PARAMS + 3;
+/// Derivatives with respect to the two parameters of astigmatism, and to the cross.
+pub(super) const SHAPE: usize = PARAMS + 3;
+/// Derivatives with respect to the skewness along rows and columns.
+pub(super) const SKEWNESS: usize = PARAMS + 6;
 /// Derivatives with respect to the strength of the halo.
-pub(super) const HALO: usize = PARAMS + 5;
+pub(super) const HALO: usize = PARAMS + 8;
 /// Derivatives with respect to the ink.
-pub(super) const INK: usize = PARAMS + 6;
+pub(super) const INK: usize = PARAMS + 9;
 /// Derivatives with respect to the parameters of the tone curve.
-pub(super) const TONE: usize = PARAMS + 7;
+pub(super) const TONE: usize = PARAMS + 10;
 
 /// Number of rows, in blocks of four.
 pub(super) const ALL: usize = (TONE + TONE_PARAMS).next_multiple_of(4);
@@ -235,12 +237,16 @@ fn fill<const K: usize, const C: usize, const JOINT: bool, P: Pattern<K>>(
             }
         }
     }
-    let by_astigmatism: [[f32; K]; 2] =
-        [0, 1].map(|e| std::array::from_fn(|k| look.by_astigmatism[e][k] as f32));
-    let rho_by_astigmatism = look.correlations.map(|of| of.by_astigmatism.map(|by| by as f32));
+    let by_shape: [[f32; K]; 3] =
+        [0, 1, 2].map(|e| std::array::from_fn(|k| look.by_shape[e][k] as f32));
+    let rho_by_shape = look.correlations.map(|of| of.by_shape.map(|by| by as f32));
+    let skewness: [f32; K] = std::array::from_fn(|k| look.skewness[k] as f32);
+    let skewness_by_turn: [f32; K] = std::array::from_fn(|k| look.skewness_by_turn[k] as f32);
+    let by_skewness: [[f32; K]; 2] =
+        [0, 1].map(|e| std::array::from_fn(|k| look.by_skewness[e][k] as f32));
     let way_by_turn: [f32; K] = std::array::from_fn(|k| look.way_by_turn[k] as f32);
-    let way_by_astigmatism: [[f32; K]; 2] =
-        [0, 1].map(|e| std::array::from_fn(|k| look.way_by_astigmatism[e][k] as f32));
+    let way_by_shape: [[f32; K]; 3] =
+        [0, 1, 2].map(|e| std::array::from_fn(|k| look.way_by_shape[e][k] as f32));
     let displaced: [f32; K] = std::array::from_fn(|k| look.displaced[k] as f32);
     // Lines of three edges move, and halves of two edges part.
     let moved: [f32; K] = if K == 3 { displaced } else { [0.0; K] };
@@ -258,7 +264,14 @@ fn fill<const K: usize, const C: usize, const JOINT: bool, P: Pattern<K>>(
         let h: [f32; K] = std::array::from_fn(|k| {
             cosines[k] * dv - sines[k] * du - 0.5 * bends[k] * along[k] * along[k] - moved[k]
         });
-        let Shade { mut f, slopes, correlations, halo, shifts, way } = pattern.at(h);
+        let Shade { mut f, mut slopes, correlations, halo, shifts, way } = pattern.at(h);
+        // The next term of Edgeworth's series of each edge.
+        let squares = h.map(|h| h * h);
+        let skewed: [f32; K] = std::array::from_fn(|k| slopes[k] * (1.0 - squares[k]));
+        for k in 0..K {
+            f += skewness[k] * skewed[k];
+            slopes[k] *= 1.0 + skewness[k] * h[k] * (squares[k] - 3.0);
+        }
         let (mut by_x, mut by_y, mut by_scale) = (0.0, 0.0, 0.0);
         // Only squares have tags with a border of the opposite colour.
         if K == 2 {
@@ -286,7 +299,7 @@ fn fill<const K: usize, const C: usize, const JOINT: bool, P: Pattern<K>>(
             for p in 0..P::CORRELATED {
                 by += correlations[p] * rho_by_angle[p][k];
             }
-            let by = by + way[k] * way_by_turn[k];
+            let by = by + way[k] * way_by_turn[k] + skewed[k] * skewness_by_turn[k];
             columns[ANGLE + k][i] = light * by;
         }
         let by_light = by_shade * (f + piece.ratio);
@@ -308,15 +321,20 @@ fn fill<const K: usize, const C: usize, const JOINT: bool, P: Pattern<K>>(
             }
             columns[INK][i] = light * by;
             for e in 0..2 {
+                let by = (0..K).map(|k| skewed[k] * by_skewness[e][k]).sum::<f32>();
+                columns[SKEWNESS + e][i] = light * by;
+            }
+            for e in 0..3 {
                 let mut by = 0.0;
                 for p in 0..P::CORRELATED {
-                    by += correlations[p] * rho_by_astigmatism[p][e];
+                    by += correlations[p] * rho_by_shape[p][e];
                 }
                 for k in 0..K {
-                    by -= (slopes[k] * h[k] + shifts[k] * parted[k]) * by_astigmatism[e][k];
-                    by += way[k] * way_by_astigmatism[e][k];
+                    by -= (slopes[k] * h[k] + shifts[k] * parted[k]) * by_shape[e][k];
+                    by += way[k] * way_by_shape[e][k];
+                    by -= 3.0 * skewness[k] * skewed[k] * by_shape[e][k];
                 }
-                columns[ASTIGMATISM + e][i] = light * by;
+                columns[SHAPE + e][i] = light * by;
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::columns::{ALL, ASTIGMATISM, HALO, INK, RISE, SHADE, TONE};
+use super::columns::{ALL, HALO, INK, RISE, SHADE, SHAPE, SKEWNESS, TONE};
 use super::corner::{ANGLE, Corner, OWN, PARAMS, SLOPE, X, Y};
 use super::fitter::{CornerFitter, MIN_NOISE, SLOPE_PRIOR, noise, with_prior};
 use super::sums::products;
@@ -17,8 +17,10 @@ use deltille_core::raster::ImageView;
 pub(crate) enum Common {
     /// A parameter of the tone curve, and the optics with it increased by a [`STEP`].
     Tone { parameter: usize, moved: Box<Optics> },
-    /// The first or second parameter of astigmatism.
-    Astigmatism(usize),
+    /// The first or second parameter of astigmatism, or the cross.
+    Shape(usize),
+    /// The skewness along rows or columns.
+    Skewness(usize),
     /// The strength of the halo.
     Halo,
     /// The growth of dark areas on the print.
@@ -78,7 +80,8 @@ impl CornerFitter {
                     }
                     TONE + parameter
                 }
-                Common::Astigmatism(i) => ASTIGMATISM + i,
+                Common::Shape(i) => SHAPE + i,
+                Common::Skewness(i) => SKEWNESS + i,
                 Common::Halo => HALO,
                 Common::Ink => INK,
             });

@@ -16,8 +16,13 @@ pub(super) struct Look<const K: usize> {
     pub(super) by_turn: [f64; K],
     /// Correlation of the blur along the normals of each pair of edges.
     pub(super) correlations: [Correlation; PAIRS.len()],
-    /// ∂ ln s_k/∂e of both parameters of astigmatism.
-    pub(super) by_astigmatism: [[f64; K]; 2],
+    /// ∂ ln s_k/∂e of both parameters of astigmatism, and of the cross.
+    pub(super) by_shape: [[f64; K]; 3],
+    /// A sixth of the skewness across each edge, and its derivatives with respect to the angle and to the skewness
+    /// along rows and columns.
+    pub(super) skewness: [f64; K],
+    pub(super) skewness_by_turn: [f64; K],
+    pub(super) by_skewness: [[f64; K]; 2],
     /// Tone curve between black and white.
     pub(super) piece: Piece,
     /// Strength of the halo, and its width relative to the blur.
@@ -25,11 +30,11 @@ pub(super) struct Look<const K: usize> {
     /// ∂ ln s/∂α of the blur of the pattern, at a constant slope of the edges.
     pub(super) core_by_halo: f32,
     /// Half of the motion across the edges during exposure, in units of the blur, if there is
-    /// motion. Also its derivatives with respect to the angles and to both parameters of
-    /// astigmatism.
+    /// motion. Also its derivatives with respect to the angles, to both parameters of astigmatism,
+    /// and to the cross.
     pub(super) way: Option<[f32; K]>,
     pub(super) way_by_turn: [f64; K],
-    pub(super) way_by_astigmatism: [[f64; K]; 2],
+    pub(super) way_by_shape: [[f64; K]; 3],
     /// Displacement of the edges by ink, in units of the blur, and its derivatives with respect to the ink. With three
     /// edges, both halves move to the same side, and with two, to opposite sides.
     pub(super) displaced: [f64; K],
@@ -38,13 +43,13 @@ pub(super) struct Look<const K: usize> {
     pub(super) limits: [f32; 2],
 }
 
-/// Correlation ρ of the blur along the normals of two edges, and its derivatives with respect to their angles and to
-/// both parameters of astigmatism.
+/// Correlation ρ of the blur along the normals of two edges, and its derivatives with respect to their angles to both
+/// parameters of astigmatism, and to the cross, on which it does not depend.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Correlation {
     pub(super) rho: f64,
     pub(super) by_angle: [f64; 2],
-    pub(super) by_astigmatism: [f64; 2],
+    pub(super) by_shape: [f64; 3],
 }
 
 impl<const K: usize> Look<K> {
@@ -54,28 +59,47 @@ impl<const K: usize> Look<K> {
         let normals = rotations.map(|(sin, cos)| [-sin, cos]);
         let tangents = rotations.map(|(sin, cos)| [-cos, -sin]);
         let product = |a, b| spread.product(a, b);
-        let squares = normals.map(|n| product(n, n));
-        let by_turn: [f64; K] =
-            std::array::from_fn(|k| product(tangents[k], normals[k]) / squares[k]);
         let parts = |a, b| spread.by_astigmatism(a, b);
-        let by_astigmatism: [[f64; K]; 2] = [0, 1].map(|e| {
-            std::array::from_fn(|k| parts(normals[k], normals[k])[e] / (2.0 * squares[k]))
+        let fourfold = corner.angles.map(|angle| (4.0 * angle).sin_cos());
+        let squares: [f64; K] =
+            std::array::from_fn(|k| product(normals[k], normals[k]) + optics.cross * fourfold[k].1);
+        let by_turn: [f64; K] = std::array::from_fn(|k| {
+            (product(tangents[k], normals[k]) - 2.0 * optics.cross * fourfold[k].0) / squares[k]
+        });
+        let by_shape: [[f64; K]; 3] = [0, 1, 2].map(|e| {
+            std::array::from_fn(|k| {
+                let by = parts(normals[k], normals[k]).get(e).copied().unwrap_or(fourfold[k].1);
+                by / (2.0 * squares[k])
+            })
+        });
+        let cubes: [[f64; K]; 2] = [0, 1]
+            .map(|e| std::array::from_fn(|k| normals[k][e].powi(3) / (6.0 * squares[k].powf(1.5))));
+        let of_skewness = |by: [f64; 2]| by[0] * optics.skewness[0] + by[1] * optics.skewness[1];
+        let skewness: [f64; K] = std::array::from_fn(|k| of_skewness(cubes.map(|cube| cube[k])));
+        let skewness_by_turn = std::array::from_fn(|k| {
+            let by = [0, 1]
+                .map(|e| normals[k][e].powi(2) * tangents[k][e] / (2.0 * squares[k].powf(1.5)));
+            of_skewness(by) - 3.0 * by_turn[k] * skewness[k]
         });
         let correlations = PAIRS.map(|[i, j]| {
             if j >= K {
                 return Correlation::default();
             }
-            let lengths = (squares[i] * squares[j]).sqrt();
+            let [first, second] = [i, j].map(|k| product(normals[k], normals[k]));
+            let lengths = (first * second).sqrt();
             let rho = product(normals[i], normals[j]) / lengths;
             let by_angle = [
-                product(tangents[i], normals[j]) / lengths - rho * by_turn[i],
-                product(normals[i], tangents[j]) / lengths - rho * by_turn[j],
+                product(tangents[i], normals[j]) / lengths
+                    - rho * product(tangents[i], normals[i]) / first,
+                product(normals[i], tangents[j]) / lengths
+                    - rho * product(tangents[j], normals[j]) / second,
             ];
-            let by_astigmatism = [0, 1].map(|e| {
-                let [first, second] = [by_astigmatism[e][i], by_astigmatism[e][j]];
-                parts(normals[i], normals[j])[e] / lengths - rho * (first + second)
+            let [e1, e2] = [0, 1].map(|e| {
+                let own = |k: usize, square: f64| parts(normals[k], normals[k])[e] / square;
+                parts(normals[i], normals[j])[e] / lengths
+                    - 0.5 * rho * (own(i, first) + own(j, second))
             });
-            Correlation { rho, by_angle, by_astigmatism }
+            Correlation { rho, by_angle, by_shape: [e1, e2, 0.0] }
         });
         let across = |way: [f64; 2], direction: [f64; 2], k: usize| {
             (way[0] * direction[0] + way[1] * direction[1]) / f64::sqrt(squares[k])
@@ -83,9 +107,9 @@ impl<const K: usize> Look<K> {
         let way: [f64; K] = std::array::from_fn(|k| across(spread.way, normals[k], k));
         let way_by_turn =
             std::array::from_fn(|k| across(spread.way, tangents[k], k) - way[k] * by_turn[k]);
-        let way_by_astigmatism = [0, 1].map(|e| {
-            let by = spread.way_by_astigmatism[e];
-            std::array::from_fn(|k| across(by, normals[k], k) - way[k] * by_astigmatism[e][k])
+        let way_by_shape = [0, 1, 2].map(|e| {
+            let by = spread.way_by_astigmatism.get(e).copied().unwrap_or_default();
+            std::array::from_fn(|k| across(by, normals[k], k) - way[k] * by_shape[e][k])
         });
         let core_px = corner.blur_px * optics.core();
         let sharpness = squares.map(|square| 1.0 / (core_px * square.sqrt()));
@@ -93,12 +117,15 @@ impl<const K: usize> Look<K> {
         let displaced = by_ink.map(|by| by * optics.ink);
         Self {
             rotations,
-            by_astigmatism,
+            by_shape,
+            skewness,
+            skewness_by_turn,
+            by_skewness: cubes,
             correlations,
             sharpness,
             way: spread.is_swept.then(|| way.map(|way| way as f32)),
             way_by_turn,
-            way_by_astigmatism,
+            way_by_shape,
             displaced,
             by_ink,
             by_turn,
