@@ -495,7 +495,9 @@ mod tests {
             let mut fitter = CornerFitter::default();
             let found = fitter.fit((&picture).into(), &window, &start, optics, Accuracy::Full);
             let found = found.expect("a corner");
-            assert!(found.noise < 1e-3 * truth.amplitude.abs(), "{K} edges: {found:?}");
+            // The blur of borders has no derivative, so the fit ends close to its minimum.
+            let most = if borders.is_empty() { 1e-3 } else { 5e-3 };
+            assert!(found.noise < most * truth.amplitude.abs(), "{K} edges: {found:?}");
             let found = found.corner;
             let off = found.position - position;
             assert!(off.length() < 1e-3, "{K} edges: {off:?}");
