@@ -29,7 +29,8 @@ const VIEWS_TO_COMPARE: usize = 24;
 /// Every n-th view is held out.
 const HELD_OUT: usize = 3;
 
-/// Maximum relative excess of the mean square error of an adequate model over the best one: 5 % in the error.
+/// A model is adequate if its mean square error exceeds that of the best model by at most this
+/// fraction: about 5 % in RMS error.
 const SAME: f64 = 0.1;
 
 /// A model that was compared.

@@ -163,12 +163,12 @@ macro_rules! quantities {
         pub mod $name {
             use super::{Deserialize, Deserializer, Numbers};
 
-            #[allow(dead_code, reason = "fields of formats other than JSON use one of the two")]
+            #[allow(dead_code, reason = "some quantities need only `RANGE` or only `de`")]
             /// Range of the quantity.
             pub const RANGE: super::Range =
                 super::Range { least: $least, most: $most, unit: $unit };
 
-            #[allow(dead_code, reason = "fields of formats other than JSON use one of the two")]
+            #[allow(dead_code, reason = "some quantities need only `RANGE` or only `de`")]
             /// Deserialises a number, or lists of numbers, within the range.
             ///
             /// # Errors

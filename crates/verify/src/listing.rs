@@ -68,7 +68,7 @@ fn differently_written(text: &str, listed: &Target) -> Option<Finding> {
         .zip(rewritten.lines())
         .take_while(|(found, rewritten)| found == rewritten)
         .count();
-    let construct = "a number or an order that is not as deltille writes it".to_owned();
+    let construct = "numbers or line order not as deltille writes them".to_owned();
     Some(ConstructFinding::Construct { place: format!("line {}", same + 1), construct }.into())
 }
 

@@ -17,8 +17,8 @@ const MARGIN: f64 = 1.02;
 /// corners.
 const BEYOND: f64 = 1.25;
 
-/// Default distance of knots in the image centre, as a fraction of the longer side: the deviations of lenses from their
-/// polynomial change little from one knot to the next.
+/// Default knot spacing at the image centre, as a fraction of the longer side: the
+/// deviation of a lens from its polynomial changes little from one knot to the next.
 const APART: f64 = 1.0 / 12.0;
 
 /// Number of sample positions along each border of the image.

@@ -462,7 +462,7 @@ fn by_candidates(i: usize, off: f64, shutter: DVec3, sheet: [f64; 5]) -> [f64; C
     [off, axis(0), axis(1), shutter.x, shutter.y, shutter.z, stretch, shear, bend_x, twist, bend_y]
 }
 
-/// A Gram matrix without its last unknowns.
+/// A Gram matrix after elimination of its last unknowns (Schur complement).
 fn eliminated(gram: DMatrix<f64>, last: usize) -> Option<DMatrix<f64>> {
     let n = gram.nrows() - last;
     if last == 0 {

@@ -409,7 +409,7 @@ fn best_width(profiles: &[&Profile], clipped_share: f64) -> (f64, f64) {
     (MIN_BLUR_PX * BLUR_STEP.powi(step), left)
 }
 
-/// Returns the best of several steps of the standard deviation of the blur, and its sum of squares.
+/// Returns the step whose blur fits the profiles best, and its sum of squared residuals.
 fn best_step(
     profiles: &[&Profile],
     clipped_share: f64,

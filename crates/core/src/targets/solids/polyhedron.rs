@@ -8,8 +8,8 @@ use crate::angles::direction;
 /// origin of their file.
 ///
 /// A face lists its vertices counterclockwise as seen from outside. The first two are the ends of its lower edge; the
-/// third vertex of a triangle is its apex. Printed on the face, x runs along the lower edge, y upwards to the apex, z
-/// outwards.
+/// third vertex of a triangle is its apex. In the frame of a face, x runs along the
+/// lower edge, y upwards to the apex, z outwards.
 ///
 /// Solids of triangles stand on the z axis: `n` is their upper vertex, `s` the lower one. The faces of a cuboid are
 /// perpendicular to the axes:

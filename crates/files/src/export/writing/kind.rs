@@ -59,7 +59,7 @@ impl Kind {
     pub fn of(content: &[u8]) -> Self {
         let signed = |format: &str, is_own: bool| {
             Self::words(if is_own {
-                format!("a {format} of deltille")
+                format!("a {format} written by deltille")
             } else {
                 format!("a {format}")
             })
@@ -119,7 +119,7 @@ impl Kind {
 
     /// The kind of the Parquet files that this program writes.
     pub fn own_parquet() -> Self {
-        Self::words("a Parquet of deltille")
+        Self::words("a Parquet written by deltille")
     }
 
     /// The kind of the PDF files that this program writes.
@@ -134,12 +134,12 @@ impl Kind {
 
     /// The kind of the PNG files that this program writes for viewing: overlays, renderings, plots.
     pub fn own_png() -> Self {
-        Self::words("a PNG of deltille")
+        Self::words("a PNG written by deltille")
     }
 
     /// The kind of the PNG files that this program writes for printing.
     pub fn own_printed_png() -> Self {
-        Self::words("a PNG to scale of deltille")
+        Self::words("a PNG to scale written by deltille")
     }
 
     /// Whether the file is known to be written by this program.

@@ -223,7 +223,8 @@ pub(in crate::report) fn against_radius(camera: &CameraEstimate, survey: &Survey
     axes.svg(["distance from the principal point, px", "error, px"], "Error against radius")
 }
 
-/// RMS of each view, px, against the tilt of the board, degrees, and the caption. For solids, whose faces have many tilts at
+/// Returns the plot of the RMS of each view, px, against the tilt of the board, degrees, and its
+/// caption. For solids, whose faces have many tilts at
 /// once, the RMS is drawn against the distance of the target, mm.
 pub(in crate::report) fn against_place(
     camera: &CameraEstimate,
