@@ -129,16 +129,15 @@ impl Refiner {
         }
         places.sort_by(|a, b| b.1.total_cmp(&a.1));
         // Those with the most room lie where the board is nearest, and the light may differ elsewhere.
-        let roomy =
-            places.partition_point(|(_, clear_px, ..)| *clear_px >= MIN_MODEL_RADIUS as f64);
+        let is_roomy = |clear_px: f64| clear_px >= MIN_MODEL_RADIUS as f64;
+        let roomy = places.partition_point(|(_, clear_px, ..)| is_roomy(*clear_px));
         places.truncate(SAMPLES.max(roomy / 2));
         let sharpness = |blur_px: f64| Sharpness { blur_px, optics: &self.known };
-        // The clear area of others is no square.
-        let mut index = 0..;
-        places.retain(|(_, _, blur_px, corner, around)| {
+        places.retain(|(_, clear_px, blur_px, corner, around)| {
+            // The clear area may have another shape than a square.
             let room = self.near(around, sharpness(*blur_px));
-            let is_roomy = index.next().is_some_and(|i| i < roomy);
-            is_roomy || self.window(image, corner.position(), room).count() >= USUAL_MIN_PIXELS
+            let count = || self.window(image, corner.position(), room).count();
+            is_roomy(*clear_px) || count() >= USUAL_MIN_PIXELS
         });
         places.sort_by_key(|(order, ..)| *order);
         let count = places.len();
@@ -233,7 +232,11 @@ impl Refiner {
         };
         let mut around = surroundings(grid, tags, 1.0);
         let mut fits = again(&around, fits);
-        if around.iter().any(|around| !around.borders.is_empty()) {
+        let may_show_borders = |around: &Surroundings| {
+            let clear_px = around.clear_square_px(sharpness.blur_px);
+            !around.borders.is_empty() && clear_px < MIN_MODEL_RADIUS as f64
+        };
+        if around.iter().any(may_show_borders) {
             // The corners determine where the borders of tags are.
             for (corner, fit) in grid.corners.iter_mut().zip(&fits) {
                 corner.move_to(fit.map_or(corner.position(), |fit| fit.position()));
