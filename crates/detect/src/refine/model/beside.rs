@@ -17,18 +17,21 @@ const MAX_RHO: f64 = 0.99;
 /// Distance from an edge beyond which it changes nothing, in units of the blur.
 const FAR: f32 = 4.5;
 
-/// Change of the pattern f at every pixel, and its derivatives with respect to the position.
+/// Change of the pattern f at every pixel, and its derivatives.
 #[derive(Clone, Debug)]
 pub(super) struct Beside {
     pub(super) f: [f32; MAX_PIXELS],
     pub(super) by_position: [[f32; MAX_PIXELS]; 2],
+    /// With respect to the logarithm of the blur.
+    pub(super) by_scale: [f32; MAX_PIXELS],
     /// Whether there is no change.
     is_none: bool,
 }
 
 impl Default for Beside {
     fn default() -> Self {
-        Self { f: [0.0; MAX_PIXELS], by_position: [[0.0; MAX_PIXELS]; 2], is_none: true }
+        let none = [0.0; MAX_PIXELS];
+        Self { f: none, by_position: [none; 2], by_scale: none, is_none: true }
     }
 }
 
@@ -48,10 +51,11 @@ impl Beside {
             let square = Square::new(border, corner, optics);
             for i in 0..window.count {
                 let place = DVec2::new(window.u[i].into(), window.v[i].into()) - corner.position;
-                let [f, by_x, by_y] = square.at(place);
+                let [f, by_x, by_y, by_scale] = square.at(place);
                 self.f[i] += f;
                 self.by_position[0][i] += by_x;
                 self.by_position[1][i] += by_y;
+                self.by_scale[i] += by_scale;
             }
         }
     }
@@ -118,11 +122,11 @@ impl Square {
     }
 
     /// Returns the change of f at a position, px from the corner, and its derivatives with respect to the position of the
-    /// corner.
-    fn at(&self, place: DVec2) -> [f32; 3] {
+    /// corner and to the logarithm of the blur.
+    fn at(&self, place: DVec2) -> [f32; 4] {
         let [strength, width] = self.halo;
         let reach = if strength == 0.0 { FAR } else { FAR * width };
-        let mut sum = [0.0; 3];
+        let mut sum = [0.0; 4];
         // A square is a quadrant, without those that begin at its far sides.
         for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
             let sides = [self.sides[0][i], self.sides[1][j]];
@@ -140,9 +144,10 @@ impl Square {
             }
             let change = if i == j { self.change } else { -self.change };
             sum[0] += change * f;
-            for (side, slope) in sides.iter().zip(slopes) {
+            for ((side, slope), h) in sides.iter().zip(slopes).zip(h) {
                 sum[1] -= change * slope * side.normal.x as f32;
                 sum[2] -= change * slope * side.normal.y as f32;
+                sum[3] -= change * slope * h;
             }
         }
         sum

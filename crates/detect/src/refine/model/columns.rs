@@ -277,6 +277,7 @@ fn fill<const K: usize, const C: usize, const JOINT: bool, P: Pattern<K>>(
         if K == 2 {
             f += beside.f[i];
             (by_x, by_y) = (beside.by_position[0][i], beside.by_position[1][i]);
+            by_scale = beside.by_scale[i];
         }
         let change = gu * u + gv * v;
         let gain = 1.0 + change;
