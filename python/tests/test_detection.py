@@ -77,6 +77,7 @@ def test_an_empty_image_gives_the_reason(board):
     assert len(found) == 0 and found.pixels.shape == (0, 2) and found.object_points.shape == (0, 3)
     assert found.covariances.shape == (0, 2, 2)
     assert found.why.kind == "too_dark" and found.why.figures["brightest"] == 0 and found.why.grid is None
+    assert found.why.fits is None
     assert str(found.why) == found.why.sentence and "dark" in found.why.sentence
     assert "dark" in found._repr_html_()
     assert found.to_opencv()[0].shape == (0, 3)
@@ -93,6 +94,7 @@ def test_several_targets_are_distinguished(camera):
     picture, _ = deltille.render(back, camera, eye=(60, -40, 300))
     found = deltille.Detector([front, back]).detect(picture)
     assert [grid.target for grid in found.grids] == ["back"]
+    assert deltille.Detector(front).detect(picture).why.fits == {"first_id": 50}
     assert not numpy.isnan(found.object_points).any()
     with pytest.raises(deltille.DetectionError):
         deltille.Detector([front, deltille.Board(5, 6, name="other")])

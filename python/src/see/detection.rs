@@ -55,6 +55,14 @@ impl Reason {
         self.0.figures.clone()
     }
 
+    /// Settings of the target with which the tags in the image would fit, as in the file of a detection: those of
+    /// ``legacy``, ``size``, ``first_id``, ``spacing`` and ``family`` that differ; ``None`` if the tags do not
+    /// contradict the target.
+    #[getter]
+    fn fits<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.0.fits.as_ref().map(|fits| record(py, fits)).transpose()
+    }
+
     fn __str__(&self) -> String {
         self.sentence()
     }
