@@ -5,6 +5,7 @@ mod control_boards;
 mod false_positives;
 mod from_photographs;
 mod hard;
+mod outer_corners;
 mod panel_ids;
 mod photographs;
 mod reasons;

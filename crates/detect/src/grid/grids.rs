@@ -8,6 +8,7 @@ use super::effort::Effort;
 use super::gaps::fill_gaps;
 use super::grow::{Growth, Place, Placed, seeds};
 use super::links::links;
+use super::outer_edges::trim;
 use super::outline::WholeBoard;
 use super::parts::join;
 use super::saddle_grid::{Growing, GrownSaddle, PlacedSaddle, SaddleGrid};
@@ -72,6 +73,7 @@ pub(crate) fn grids<const N: usize>(
             if has_grown {
                 fill_gaps(finder, pyramid, &mut grid, &mut effort);
             }
+            trim(pyramid, &mut grid);
             grid.into_iter().map(|(v, grown)| (v, plain(&grown))).collect()
         })
         .collect();

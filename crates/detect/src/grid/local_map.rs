@@ -32,7 +32,7 @@ const NO_PRIOR: f64 = 1e-9;
 
 /// Standard deviation of a corner from the smooth map, px of its level. Fits are at least this
 /// accurate.
-const PLACE_PX: f64 = 0.3;
+pub(crate) const PLACE_PX: f64 = 0.3;
 
 /// Maximum number of fitted corners. Further ones are farther away and contribute little.
 const MOST: usize = 20;

@@ -9,7 +9,8 @@
 //!    visible but its edges are, these meet in it (`edge_crossing`). `effort` limits the searches per image.
 //! 3. `parts` joins parts on both sides of an occluder, where the map of a grid (`local_map`), with rows and columns
 //!    that may be wide and narrow in turn (`spacing`), continues.
-//! 4. `grids` runs these, and removes duplicates and grids of the cells of tags.
+//! 4. `outer_edges` removes corners at the end of a grid whose tiles are not all visible. `grids` runs these, and
+//!    removes duplicates and grids of the cells of tags.
 //! 5. `outline` fits a visible board. `untagged` distinguishes boards without tags from other patterns.
 
 pub(crate) mod edge;
@@ -21,6 +22,7 @@ pub(crate) mod grow;
 pub(crate) mod links;
 pub(crate) mod local_map;
 pub(crate) mod neighbours;
+pub(crate) mod outer_edges;
 pub(crate) mod outline;
 pub(crate) mod parts;
 pub(crate) mod rectified;

@@ -16,6 +16,7 @@ pub(crate) mod corner_start;
 pub(crate) mod correlation;
 pub(crate) mod edge_shift;
 pub(crate) mod joint_fit;
+pub(crate) mod misplaced;
 pub(crate) mod model;
 pub(crate) mod optics;
 pub(crate) mod refine_grid;
