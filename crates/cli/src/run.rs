@@ -5,8 +5,8 @@ use std::io;
 use std::process::ExitCode;
 
 use anyhow::Context;
-use clap::Parser;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{Command, Parser};
 
 use crate::output::log;
 use crate::{interrupt, wording};
@@ -44,7 +44,7 @@ pub fn run_with<A: Parser>(
 ) -> ExitCode {
     interrupt::listen();
     wording::install();
-    let mut command = A::command();
+    let mut command = with_negative_numbers(A::command());
     let parsed = command.try_get_matches_from_mut(&arguments).and_then(|matches| {
         wording::set_command(&command, &matches);
         A::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
@@ -99,6 +99,16 @@ fn shortened(line: &str) -> String {
     let start: String = line.chars().take(MAX_CHARACTERS).collect();
     let end: String = line.chars().skip(count - MAX_CHARACTERS).collect();
     format!("{start} … {end}")
+}
+
+/// Returns a command whose options take negative numbers as values, so that their parsers can name the valid ones.
+fn with_negative_numbers(command: Command) -> Command {
+    command
+        .mut_args(|argument| {
+            let is_number = !argument.is_positional() && argument.get_action().takes_values();
+            if is_number { argument.allow_negative_numbers(true) } else { argument }
+        })
+        .mut_subcommands(with_negative_numbers)
 }
 
 /// Returns the first paragraph of a clap message and its tip on one line.

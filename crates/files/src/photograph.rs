@@ -77,6 +77,12 @@ pub enum ImageError {
         /// The cause.
         source: std::io::Error,
     },
+    /// The file has no content.
+    #[error("{}: an empty file (0 bytes): copy it again", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
     /// The file is not an image in a format that can be decoded.
     #[error(
         "{}: not a readable PNG, JPEG, TIFF, BMP, PGM or WebP image ({source})",
@@ -115,7 +121,7 @@ pub enum ImageError {
     /// The image, or its file, takes more memory than the limits allow, although its number of
     /// pixels does not exceed them.
     #[error(
-        "{}: needs more than {bytes} bytes of memory; {LimitsMaxPixels} sets this limit (4 bytes per pixel)",
+        "{}: needs more than {bytes} bytes of memory, which is 4 for each pixel of the limit: raise {LimitsMaxPixels}",
         path.display()
     )]
     Memory {
@@ -245,6 +251,13 @@ trait Source: BufRead + Seek {}
 
 impl<T: BufRead + Seek> Source for T {}
 
+fn check_not_empty(path: &Path, length: u64) -> Result<(), ImageError> {
+    match length {
+        0 => Err(ImageError::Empty { path: path.to_owned() }),
+        _ => Ok(()),
+    }
+}
+
 /// An open image file.
 struct ImageFile<'a> {
     path: &'a Path,
@@ -278,6 +291,7 @@ impl<'a> ImageFile<'a> {
             }
         }
         let length = if metadata.is_file() { metadata.len() } else { bytes.len() as u64 };
+        check_not_empty(path, length)?;
         check_webp(path, format, &bytes, length)?;
         Ok(Self { path, bytes: is_whole.then_some(bytes), length, format })
     }
@@ -288,6 +302,7 @@ impl<'a> ImageFile<'a> {
         if length > most {
             return Err(ImageError::Memory { path: path.to_owned(), bytes: most });
         }
+        check_not_empty(path, length)?;
         let format = image::guess_format(&bytes).ok();
         check_webp(path, format, &bytes, length)?;
         Ok(Self { path, bytes: Some(bytes), length, format })

@@ -14,7 +14,7 @@ use crate::family_file::{self, FamilyFileError};
 use crate::limits::{Limits, ReadError};
 
 /// Extensions of files that are generated from a target and do not describe it.
-const MADE: [&str; 8] = ["pdf", "svg", "png", "glb", "obj", "stl", "dxf", "mtl"];
+const MADE: [&str; 10] = ["pdf", "svg", "png", "glb", "obj", "stl", "dxf", "mtl", "yaml", "yml"];
 
 /// Error of reading a target.
 #[derive(Debug, thiserror::Error)]
@@ -27,6 +27,12 @@ pub enum TargetReadError {
         path: PathBuf,
         /// Its extension.
         extension: String,
+    },
+    /// A folder.
+    #[error("{}: a folder: use the .json of the target in it", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
     },
     /// The leftovers of an interrupted run cannot be cleaned up.
     #[error(transparent)]
@@ -70,6 +76,9 @@ pub fn read(path: &Path, limits: &Limits) -> Result<Printing, TargetReadError> {
     let path_of = || path.to_owned();
     if MADE.contains(&extension.as_str()) {
         return Err(TargetReadError::Made { path: path_of(), extension });
+    }
+    if path.is_dir() {
+        return Err(TargetReadError::Folder { path: path_of() });
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     staging::settle(folder.unwrap_or(Path::new("."))).map_err(TargetReadError::Settle)?;

@@ -198,6 +198,7 @@ fn messages_of_detect() {
     std::fs::write(at.join("cut.png"), &sheet[..sheet.len() / 2]).unwrap();
     std::fs::write(at.join("empty.png"), "").unwrap();
     std::fs::write(at.join("empty.dsc"), "").unwrap();
+    std::fs::write(at.join("found.yaml"), "%YAML:1.0").unwrap();
     std::fs::create_dir(at.join("other")).unwrap();
     std::fs::write(at.join("other/board.png"), sheet).unwrap();
     let more = "board --rows 9 --cols 10 --edge 10 --untagged --png --dpi 200 -o more";
@@ -239,6 +240,8 @@ fn messages_of_detect() {
         "--target empty.dsc sheet/board.png",
         "--target missing.json sheet/board.png",
         "--target sheet/board.png sheet/board.png",
+        "--target other sheet/board.png",
+        "--target found.yaml sheet/board.png",
         "--target board.json sheet/board.png",
         "--target board.json sheet/board.png --max-errors 9",
         "--target board.json sheet/board.png --rows 3 --cols 3",
@@ -246,14 +249,17 @@ fn messages_of_detect() {
         "--grid hexagons sheet/board.png",
         "--grid deltille sheet/board.png --allow-mirrored",
         "--grid deltille sheet/board.png --rows 0 --cols 4",
+        "--grid deltille sheet/board.png --rows -3 --cols 4",
         "--grid deltille sheet/board.png -j 0",
         "--grid deltille sheet/board.png other/board.png",
         "--grid deltille empty.dsc",
         "--grid deltille other/*.jpg",
         "--grid deltille - -",
+        "--grid deltille -",
         "--grid deltille sheet --stream --skip-existing",
         "--target board.json sheet/board.png -o out --max-bytes 100",
         "--grid deltille sheet/board.png -o out --max-pixels 1M",
+        "--grid deltille sheet/board.png -o out --max-pixels 10",
         "--grid deltille sheet/board.png -o out --max-pixels 0",
     ] {
         page.refused(at, &format!("deltille detect {args}"));

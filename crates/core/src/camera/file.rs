@@ -36,6 +36,7 @@ use serde::{Deserialize, Serialize};
 use crate::identity::TargetIdentity;
 use crate::quantity;
 use crate::reading::in_words;
+use crate::setting::Setting::CalibrationWrite;
 
 use super::kannala_brandt::MIN_TERMS;
 use super::{Camera, Lens, LensKind, MAX_LENS_PARAMETERS, SplineGrid};
@@ -52,7 +53,7 @@ const MAX_DEPTH: usize = 16;
 #[non_exhaustive]
 pub enum CameraFileError {
     /// The text is not YAML, or does not have these keys.
-    #[error("not a camera file: {0}")]
+    #[error("not a camera file: {0}; use the .yaml that {CalibrationWrite} wrote")]
     Yaml(String),
     /// The value of a key is invalid.
     #[error("key `{key}`: {problem}")]

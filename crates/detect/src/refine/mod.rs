@@ -9,6 +9,7 @@
 //! 4. `edge_shift` measures how far edges have moved. `shared_optics` estimates the shared parameters (`optics`) from all corners together. `joint_fit` fits them, and
 //!    `significance` removes those that are not significant. `correlation` corrects covariances for noise that is not
 //!    white.
+//! 5. `misplaced` finds uncertain corners that contradict the others.
 
 pub(crate) mod blurred_corner;
 pub(crate) mod clearance;

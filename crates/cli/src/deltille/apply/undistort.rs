@@ -1,5 +1,6 @@
 //! `deltille undistort` and `deltille rectify`.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -233,25 +234,31 @@ impl Pictures<'_> {
         }
         let count = images.count().unwrap_or(0);
         let bar = progress::bar(count as u64, "images");
-        let failed: Mutex<Vec<anyhow::Error>> = Mutex::default();
+        let failed: Mutex<BTreeMap<usize, anyhow::Error>> = Mutex::default();
         let done: Mutex<usize> = Mutex::default();
         let pool = rayon::ThreadPoolBuilder::new().build()?;
-        images_at_once::for_each(&pool, &self.args.limits.limits(), images.iter(), |_, image| {
-            if interrupt::is_raised() {
-                return;
-            }
-            match image.and_then(|image| self.write_one(&image, map)) {
-                Ok(()) => *done.lock().expect("no thread panics here") += 1,
-                Err(error) => {
-                    bar.suspend(|| run::report(&error));
-                    failed.lock().expect("no thread panics here").push(error);
+        images_at_once::for_each(
+            &pool,
+            &self.args.limits.limits(),
+            images.iter(),
+            |index, image| {
+                if interrupt::is_raised() {
+                    return;
                 }
-            }
-            bar.inc(1);
-        });
+                match image.and_then(|image| self.write_one(&image, map)) {
+                    Ok(()) => *done.lock().expect("no thread panics here") += 1,
+                    Err(error) => {
+                        failed.lock().expect("no thread panics here").insert(index, error);
+                    }
+                }
+                bar.inc(1);
+            },
+        );
         bar.finish_and_clear();
         let done = done.into_inner().expect("no thread panics here");
-        let failed = failed.into_inner().expect("no thread panics here").len();
+        let failed = failed.into_inner().expect("no thread panics here");
+        failed.values().for_each(run::report);
+        let failed = failed.len();
         if done > 0 {
             say!("wrote {} to {}", counted(done, "image"), self.folder.display());
         } else if is_new {

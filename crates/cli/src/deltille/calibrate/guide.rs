@@ -279,6 +279,12 @@ struct Watch<'a> {
 impl Watch<'_> {
     fn run(mut self) -> anyhow::Result<ExitCode> {
         let mut is_first = true;
+        if !self.args.once {
+            log!(
+                "waiting for photographs in {}; stop with Ctrl-C, or use --once to read the folder once",
+                self.args.folder.display()
+            );
+        }
         loop {
             let (changed, last) = self.observe()?;
             let waits = self.pictures.values().any(|picture| picture.seen.is_none());

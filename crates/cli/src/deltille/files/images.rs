@@ -4,11 +4,14 @@ use std::collections::BTreeMap;
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 
 /// Extensions of the files used from a folder; files named directly may have any extension.
 const EXTENSIONS: [&str; 11] =
     ["png", "jpg", "jpeg", "tif", "tiff", "bmp", "pgm", "ppm", "pnm", "pbm", "webp"];
+
+/// The error of an empty list.
+const NO_LIST: &str = "-: standard input contains no file names; write one path per line";
 
 /// Images in the order of the arguments; a list on standard input is read as it arrives.
 pub struct Images {
@@ -51,10 +54,16 @@ impl Images {
     pub fn iter(&self) -> impl Iterator<Item = anyhow::Result<PathBuf>> + Send + '_ {
         let (before, after) = self.named.split_at(self.listed.unwrap_or(0));
         let lines = self.listed.map(|_| std::io::BufReader::new(std::io::stdin()).lines());
-        let listed = lines.into_iter().flatten().filter_map(|line| match line {
+        let mut listed = lines.into_iter().flatten().filter_map(|line| match line {
             Ok(line) if line.trim().is_empty() => None,
             Ok(line) => Some(Ok(PathBuf::from(line.trim_end_matches('\r')))),
             Err(error) => Some(Err(error).context("-: the list on standard input")),
+        });
+        let mut is_empty = self.listed.is_some();
+        let listed = std::iter::from_fn(move || {
+            let next = listed.next();
+            let is_missing = std::mem::replace(&mut is_empty, false) && next.is_none();
+            if is_missing { Some(Err(anyhow!(NO_LIST))) } else { next }
         });
         before.iter().cloned().map(Ok).chain(listed).chain(after.iter().cloned().map(Ok))
     }

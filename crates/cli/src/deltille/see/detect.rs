@@ -375,7 +375,9 @@ impl Report {
             let nothing = found == 0 && skipped == 0;
             return Ok(if nothing { ExitCode::from(FAILED) } else { ExitCode::SUCCESS });
         }
-        log!("error: {failed} of {all} images failed");
+        if all > 1 {
+            log!("error: {failed} of {all} images failed");
+        }
         Ok(ExitCode::from(if failed == all { BAD_INPUT } else { FAILED }))
     }
 }

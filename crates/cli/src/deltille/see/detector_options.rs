@@ -24,9 +24,9 @@ pub struct FinderArgs {
     #[arg(long, value_name = "KIND")]
     grid: Option<Kind>,
     /// Number of corner rows of the untagged board. With --cols, a fully visible board is labelled:
-    /// corner (0, 0) is at the lower left; a checkerboard is turned so that the square in its lower
-    /// left corner is dark (if two orientations are possible, the one whose corner (0, 0) is lower
-    /// in the image)
+    /// corner (0, 0) is at the lower left, for a checkerboard in the orientation in which the
+    /// square in its lower left corner is dark (if two orientations are possible, in the one in
+    /// which corner (0, 0) is lower in the image)
     #[arg(long, conflicts_with = "target", requires = "cols", value_parser = whole(SIDES))]
     rows: Option<u32>,
     /// Number of corners per row of the untagged board
