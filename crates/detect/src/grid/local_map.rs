@@ -171,6 +171,11 @@ impl LocalMap {
         })
     }
 
+    /// Returns the mean length of an edge, px.
+    pub(crate) fn edge_px(&self) -> f64 {
+        self.jacobian.iter().map(|column| column.length()).sum::<f64>() / 2.0
+    }
+
     /// Returns the direction of a lattice step, px.
     pub(crate) fn along(&self, step: Vertex) -> DVec2 {
         let [col, row] = self.jacobian;

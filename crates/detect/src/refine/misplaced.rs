@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use crate::grid::local_map::{Bend, LocalMap, PLACE_PX};
+use crate::grid::local_map::{LocalMap, PLACE_PX, Shape};
 use crate::tiling::{CHECKER, DELTILLE};
 use deltille_core::detection::{Grid, GridCorner};
 use deltille_core::lattice::{GridKind, Vertex};
@@ -50,15 +50,13 @@ fn misplaced<const N: usize>(corners: &[GridCorner], doubtful: &[bool]) -> Vec<b
     let vertex = |corner: &GridCorner| Vertex::new(corner.row, corner.col);
     let mut places: BTreeMap<Vertex, DVec2> =
         corners.iter().map(|corner| (vertex(corner), corner.position())).collect();
-    let bend = Bend::of::<N>(places.keys().copied(), |v| places.get(&v).copied(), 0);
+    let shape = Shape::of::<N>(places.keys().copied(), |v| places.get(&v).copied(), 0);
     loop {
         let off = |(i, corner): (usize, &GridCorner)| {
             let here = vertex(corner);
             let others = |v: Vertex| places.get(&v).copied().filter(|_| v != here);
-            let map = LocalMap::about::<N>(here, others, bend)?;
-            let [col, row] = map.jacobian;
-            let edge_px = (col.length() + row.length()) / 2.0;
-            let sigma_px = (map.sigma * edge_px).hypot(PLACE_PX);
+            let map = LocalMap::about::<N>(here, others, shape)?;
+            let sigma_px = (map.sigma * map.edge_px()).hypot(PLACE_PX);
             let sigmas = map.place.distance(corner.position()) / sigma_px;
             (sigmas > MAX_SIGMAS).then_some((i, here, sigmas))
         };
