@@ -75,8 +75,8 @@ fn bad_light_bad_focus_and_long_distance_are_reported() {
         assert_eq!(why(300.0, bright), [ReasonKind::Overexposed], "{kind:?}");
         let blurred = light().blur_px(25.0);
         assert_eq!(why(300.0, blurred), [ReasonKind::TooBlurred], "{kind:?}");
-        // Tiles of 5.5 px; those of 6 px are read on some checkerboards.
-        assert_eq!(why(3000.0, light()), [ReasonKind::TooSmall], "{kind:?}");
+        // Tiles of 4.6 px; those of 5.5 px are read on some checkerboards.
+        assert_eq!(why(3600.0, light()), [ReasonKind::TooSmall], "{kind:?}");
         let nothing = Gray::from_fn(800, 600, |x, y| if x + y < 700 { 40 } else { 220u8 });
         assert_eq!(board.not_seen_in(&nothing), [ReasonKind::NoCorners], "{kind:?}");
     }
