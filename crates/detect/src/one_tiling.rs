@@ -16,7 +16,6 @@ use crate::labels::grid_labels::{FoundGrid, Labels, MAX_CORNERS, report_once};
 use crate::labels::placement::labeller::Budget;
 use crate::refine::clearance::{TagAreas, surroundings};
 use crate::refine::edge_shift::{has_straight_edges, large_shift};
-use crate::refine::misplaced::drop_misplaced;
 use crate::refine::model::fitter::CornerFitter;
 use crate::refine::optics::Optics;
 use crate::refine::refine_grid::{Level, is_sampled, sharp_level};
@@ -370,8 +369,6 @@ impl OneTiling {
         });
         // Refinement has removed some false corners.
         self.refuse_patterns(frame.pyramid, &mut grids);
-        // Misplaced corners still show where the pattern ends.
-        grids.iter_mut().for_each(|(grid, _)| drop_misplaced(grid));
         (grids, optics)
     }
 

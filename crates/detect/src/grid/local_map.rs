@@ -32,7 +32,7 @@ const NO_PRIOR: f64 = 1e-9;
 
 /// Standard deviation of a corner from the smooth map, px of its level. Fits are at least this
 /// accurate.
-pub(crate) const PLACE_PX: f64 = 0.3;
+const PLACE_PX: f64 = 0.3;
 
 /// Maximum number of fitted corners. Further ones are farther away and contribute little.
 const MOST: usize = 20;
@@ -169,11 +169,6 @@ impl LocalMap {
             spacing,
             sigma: variance.sqrt(),
         })
-    }
-
-    /// Returns the mean length of an edge, px.
-    pub(crate) fn edge_px(&self) -> f64 {
-        self.jacobian.iter().map(|column| column.length()).sum::<f64>() / 2.0
     }
 
     /// Returns the direction of a lattice step, px.

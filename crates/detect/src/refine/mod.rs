@@ -9,7 +9,6 @@
 //! 4. `edge_shift` measures how far edges have moved. `shared_optics` estimates the shared parameters (`optics`) from all corners together. `joint_fit` fits them, and
 //!    `significance` removes those that are not significant. `correlation` corrects covariances for noise that is not
 //!    white.
-//! 5. `misplaced` finds uncertain corners that contradict the others.
 
 pub(crate) mod blurred_corner;
 pub(crate) mod clearance;
@@ -17,7 +16,6 @@ pub(crate) mod corner_start;
 pub(crate) mod correlation;
 pub(crate) mod edge_shift;
 pub(crate) mod joint_fit;
-pub(crate) mod misplaced;
 pub(crate) mod model;
 pub(crate) mod optics;
 pub(crate) mod refine_grid;
