@@ -32,7 +32,7 @@ const LAGS: [[isize; 2]; 6] = [[1, 0], [0, 1], [1, 1], [-1, 1], [2, 0], [0, 2]];
 const INTERPOLATED: f32 = 1.2;
 
 /// Correlation above which noise is not white: the scatter of six lags in [`LEAST_SQUARES`]. Red and blue at each
-/// other's places have 0.12 or more, and a denoised, sharpened or compressed image exceeds 0.2.
+/// other's positions have 0.12 or more, and a denoised, sharpened or compressed image exceeds 0.2.
 const WHITE: f32 = 0.06;
 
 /// Side of the squares whose mean colours bring the planes to a common level, px: the noise of the mean of nine of them
@@ -57,15 +57,15 @@ where
 {
     let (pixels, rest) = colours.as_chunks::<N>();
     let is_whole = N >= 3 && rest.is_empty() && width.checked_mul(height) == Some(pixels.len());
-    let picture = is_whole.then_some(Picture { width, height, pixels })?;
-    let squares = picture.flat_squares();
+    let planes = is_whole.then_some(Planes { width, height, pixels })?;
+    let squares = planes.flat_squares();
     let most = |red: [usize; 2]| {
-        let found = picture.correlations(&squares, |x, y| channel(red, x, y))?;
+        let found = planes.correlations(&squares, |x, y| channel(red, x, y))?;
         Some((found.into_iter().fold(0.0, |most: f32, of| most.max(of.abs())), red))
     };
     let positions = [[0, 0], [1, 0], [0, 1], [1, 1]].into_iter().filter_map(most);
     let (rest, red) = positions.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    (rest < WHITE && picture.contrast(&squares, red) > INTERPOLATED).then(|| picture.levelled(red))
+    (rest < WHITE && planes.contrast(&squares, red) > INTERPOLATED).then(|| planes.levelled(red))
 }
 
 /// Returns which colour is measured at a pixel of a mosaic whose first red pixel is `red`.
@@ -85,13 +85,13 @@ fn arm(i: usize) -> f32 {
 /// Sum of the squares of [`arm`] over a square: side² (side² − 1)/12.
 const ARMS: f32 = (SQUARE_PX * SQUARE_PX * (SQUARE_PX * SQUARE_PX - 1)) as f32 / 12.0;
 
-struct Picture<'a, T, const N: usize> {
+struct Planes<'a, T, const N: usize> {
     width: usize,
     height: usize,
     pixels: &'a [[T; N]],
 }
 
-impl<T: Intensity + TryFrom<u32> + Ord, const N: usize> Picture<'_, T, N> {
+impl<T: Intensity + TryFrom<u32> + Ord, const N: usize> Planes<'_, T, N> {
     fn at(&self, x: usize, y: usize) -> &[T; N] {
         &self.pixels[y * self.width + x]
     }
@@ -339,7 +339,7 @@ mod tests {
     fn other_colours_are_left_alone() {
         let (_, colours) = sensor([0, 0], [1.0; 3]);
         let is_left = |colours: Vec<u8>| measured::<u8, 3>(SIDE, SIDE, &colours).is_none();
-        // Three planes measured at every pixel, and a grey picture.
+        // Three planes measured at every pixel, and a grey image.
         let independent = (0..3 * SIDE * SIDE).map(|i| (128.0 + noise(i)) as u8).collect();
         assert!(is_left(independent));
         let grey = (0..3 * SIDE * SIDE).map(|i| (128.0 + noise(i / 3)) as u8).collect();

@@ -54,8 +54,8 @@ pub(crate) struct Optics {
     /// Cross: the squared blur across an edge at the angle θ is larger by c cos 4θ. Interpolation between the pixels of
     /// a colour filter, sharpening and JPEG treat rows and columns alike, but not diagonals.
     pub cross: f64,
-    /// Skewness of the blur along rows and columns: third cumulants relative to the cube of the blur. A picture reduced
-    /// after demosaicing has them, because the filters occupy fixed places in each of its pixels.
+    /// Skewness of the blur along rows and columns: third cumulants relative to the cube of the blur. An image
+    /// reduced after demosaicing has them, because the filters have fixed positions in each of its pixels.
     pub skewness: [f64; 2],
     /// Whether the astigmatism is motion blur along a line instead of a Gaussian.
     pub is_motion: bool,
