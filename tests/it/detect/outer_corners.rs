@@ -1,6 +1,8 @@
 //! Untagged boards of small tiles, on a page with a narrow margin and text, and under rectangular covers: every corner
 //! found is a corner of the board.
 
+use std::f64::consts::{PI, TAU};
+
 use std::collections::BTreeSet;
 
 use deltille::detect::{Detection, Detector, DetectorConfig};
@@ -37,7 +39,7 @@ struct View {
 impl View {
     /// A random view with tiles of `edge_px`, foreshortened by up to a quarter.
     fn new(kind: GridKind, edge_px: f64, rng: &mut ChaCha8Rng) -> Self {
-        let (roll, tilted) = (rng.random_range(0.0..6.28), rng.random_range(0.0..3.14));
+        let (roll, tilted) = (rng.random_range(0.0..TAU), rng.random_range(0.0..PI));
         let [along, short] = [DVec2::from_angle(tilted), DVec2::from_angle(tilted).perp()];
         let part = rng.random_range(0.75..1.0);
         let seen = |v: DVec2| {
