@@ -1,9 +1,8 @@
 //! Untagged boards of small tiles, on a page with a narrow margin and text, and under rectangular covers: every corner
 //! found is a corner of the board.
 
-use std::f64::consts::{PI, TAU};
-
 use std::collections::BTreeSet;
+use std::f64::consts::{PI, TAU};
 
 use deltille::detect::{Detection, Detector, DetectorConfig};
 use deltille::lattice::{GridKind, Vertex};
