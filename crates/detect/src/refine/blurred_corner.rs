@@ -405,6 +405,12 @@ impl<const NODES: usize> Orthant<NODES> {
     }
 }
 
+/// Returns the slope of an edge, ∂ erf(h/√2)/∂h.
+#[inline(always)]
+pub(crate) fn edge_slope(h: f32) -> f32 {
+    SLOPE * bell(h)
+}
+
 /// exp(−h²/2).
 #[inline(always)]
 fn bell(h: f32) -> f32 {

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::joint_fit::{Member, Problem, Sample, weights_of};
 use super::model::fitter::CornerFitter;
-use super::optics::{CROSS, HALO, INK, Optics, PARAMS, SKEWNESS};
+use super::optics::{CROSS, HALO, INK, Optics, PARAMS};
 use deltille_core::detection::{InkEstimate, TONE_PARAMS, ToneEstimate};
 use deltille_core::raster::ImageView;
 use deltille_core::statistics::median;
@@ -55,8 +55,9 @@ impl Optics {
         let is_active = |p: usize| match p {
             0..TONE_PARAMS => known.is_open,
             INK => known.is_ink_open,
-            // Of a clipped edge, only the dark side shows its profile.
-            CROSS | SKEWNESS.. if p < HALO => range[1] < 1.0,
+            // Of a clipped edge, only the dark side shows its profile. Two edges do not move with their blur, and
+            // where their halves have parted, the profile of a gap would be taken for that of an edge.
+            CROSS.. if p < HALO => K == 3 && range[1] < 1.0,
             _ => true,
         };
         let members = samples.into_iter().map(Member::from).collect();

@@ -8,6 +8,7 @@ use super::look::Look;
 use super::window::{MAX_PIXELS, Window};
 use crate::refine::blurred_corner::{
     Deltille, FEW_NODES_RHO, Orthant, PAIRS, Pattern, Shade, SweptChecker, SweptDeltille,
+    edge_slope,
 };
 use deltille_core::detection::TONE_PARAMS;
 
@@ -265,12 +266,16 @@ fn fill<const K: usize, const C: usize, const JOINT: bool, P: Pattern<K>>(
             cosines[k] * dv - sines[k] * du - 0.5 * bends[k] * along[k] * along[k] - moved[k]
         });
         let Shade { mut f, mut slopes, correlations, halo, shifts, way } = pattern.at(h);
-        // The next term of Edgeworth's series of each edge.
-        let squares = h.map(|h| h * h);
-        let skewed: [f32; K] = std::array::from_fn(|k| slopes[k] * (1.0 - squares[k]));
-        for k in 0..K {
-            f += skewness[k] * skewed[k];
-            slopes[k] *= 1.0 + skewness[k] * h[k] * (squares[k] - 3.0);
+        // The next term of Edgeworth's series of each of three edges.
+        let mut skewed = [0.0; K];
+        if K == 3 {
+            for k in 0..K {
+                let (square, steep) =
+                    (h[k] * h[k], if k == 1 { -1.0 } else { 1.0 } * edge_slope(h[k]));
+                skewed[k] = steep * (1.0 - square);
+                f += skewness[k] * skewed[k];
+                slopes[k] += skewness[k] * steep * h[k] * (square - 3.0);
+            }
         }
         let (mut by_x, mut by_y, mut by_scale) = (0.0, 0.0, 0.0);
         // Only squares have tags with a border of the opposite colour.

@@ -72,13 +72,17 @@ impl<const K: usize> Look<K> {
                 by / (2.0 * squares[k])
             })
         });
+        // The series of an edge is that about a Gaussian, so motion has none.
+        let part = if spread.is_swept { 0.0 } else { 1.0 / 6.0 };
         let cubes: [[f64; K]; 2] = [0, 1]
-            .map(|e| std::array::from_fn(|k| normals[k][e].powi(3) / (6.0 * squares[k].powf(1.5))));
-        let of_skewness = |by: [f64; 2]| by[0] * optics.skewness[0] + by[1] * optics.skewness[1];
+            .map(|e| std::array::from_fn(|k| part * normals[k][e].powi(3) / squares[k].powf(1.5)));
+        let [g1, g2] = optics.skewness;
+        let of_skewness = |by: [f64; 2]| by[0] * g1 + by[1] * g2;
         let skewness: [f64; K] = std::array::from_fn(|k| of_skewness(cubes.map(|cube| cube[k])));
         let skewness_by_turn = std::array::from_fn(|k| {
-            let by = [0, 1]
-                .map(|e| normals[k][e].powi(2) * tangents[k][e] / (2.0 * squares[k].powf(1.5)));
+            let by = [0, 1].map(|e| {
+                3.0 * part * normals[k][e].powi(2) * tangents[k][e] / squares[k].powf(1.5)
+            });
             of_skewness(by) - 3.0 * by_turn[k] * skewness[k]
         });
         let correlations = PAIRS.map(|[i, j]| {
