@@ -316,12 +316,7 @@ mod tests {
             let [(c1, o1), (c2, o2)] = [moved(step), moved(-step)];
             let quotient = (joint(&c2, &o2).cost - joint(&c1, &o1).cost) / (4.0 * step);
             let error = (here.gradient[i] - quotient).abs() / scale;
-            // The skewness of an edge under motion is that of its Gaussian part.
-            let most = match optics.is_motion {
-                _ if LIGHT.contains(&i) => 0.1,
-                true => 0.06,
-                false => 0.03,
-            };
+            let most = if LIGHT.contains(&i) { 0.1 } else { 0.03 };
             assert!(error < most, "{K} edges, motion {}, {i}: {error}", optics.is_motion);
         }
     }
