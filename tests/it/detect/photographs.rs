@@ -82,10 +82,11 @@ fn all_images_of_one_print_have_the_same_ink() {
     let all = InkEstimate::of_all(&inks).unwrap();
     println!("{all}, from {} of {} pictures", all.images, images.len().div_ceil(3));
     assert!(all.used && inks.len() == images.len().div_ceil(3));
-    assert!(
-        inks.iter().all(|ink| ink.used && (ink.edges / all.edges - 1.0).abs() < 0.15),
-        "{inks:?}"
-    );
+    // Where the blur is skewed, the ink is less certain.
+    let is_near = |ink: &InkEstimate| {
+        (ink.edges - all.edges).abs() < (0.1 * all.edges).max(4.0 * ink.edges_sd)
+    };
+    assert!(inks.iter().all(|ink| ink.used && is_near(ink)), "{inks:?}");
 }
 
 #[test]
