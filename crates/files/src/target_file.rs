@@ -28,12 +28,6 @@ pub enum TargetReadError {
         /// Its extension.
         extension: String,
     },
-    /// A folder.
-    #[error("{}: a folder: use the .json of the target in it", path.display())]
-    Folder {
-        /// The folder.
-        path: PathBuf,
-    },
     /// The leftovers of an interrupted run cannot be cleaned up.
     #[error(transparent)]
     Settle(std::io::Error),
@@ -76,9 +70,6 @@ pub fn read(path: &Path, limits: &Limits) -> Result<Printing, TargetReadError> {
     let path_of = || path.to_owned();
     if MADE.contains(&extension.as_str()) {
         return Err(TargetReadError::Made { path: path_of(), extension });
-    }
-    if path.is_dir() {
-        return Err(TargetReadError::Folder { path: path_of() });
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     staging::settle(folder.unwrap_or(Path::new("."))).map_err(TargetReadError::Settle)?;
