@@ -13,10 +13,10 @@ pub struct Args {
     /// A shipped family such as d49h12, or a family file
     family: String,
     /// Index of the first tag in the enumeration, counted from 0
-    #[arg(long, allow_negative_numbers = true, value_parser = whole(0..=u64::MAX))]
+    #[arg(long, value_parser = whole(0..=u64::MAX))]
     rank: u64,
     /// Number of tags to print
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true,
+    #[arg(long, default_value_t = 1,
           value_parser = whole(1..=u64::MAX))]
     count: u64,
 }

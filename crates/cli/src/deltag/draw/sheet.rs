@@ -30,7 +30,7 @@ pub struct Args {
     #[arg(long, value_name = "LENGTH", default_value = "30mm", allow_hyphen_values = true)]
     edge: String,
     /// Width of a tag's black border in cells, as on boards
-    #[arg(long, value_name = "BITS", default_value_t = 1.5, allow_negative_numbers = true,
+    #[arg(long, value_name = "BITS", default_value_t = 1.5,
           value_parser = crate::values::number(0.6..=10.0))]
     tag_border: f64,
     /// Paper size
@@ -52,7 +52,7 @@ pub struct Args {
     #[arg(long)]
     png: bool,
     /// Resolution of the PNG, dots per inch [default: 300]
-    #[arg(long, allow_negative_numbers = true, value_parser = whole(150..=2400u32))]
+    #[arg(long, value_parser = whole(150..=2400u32))]
     dpi: Option<u32>,
     /// Output folder
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]

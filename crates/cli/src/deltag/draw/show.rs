@@ -28,10 +28,10 @@ pub struct Args {
     #[arg(long)]
     png: bool,
     /// Resolution of the PNG, dots per inch [default: 200]
-    #[arg(long, allow_negative_numbers = true, value_parser = whole(20..=2400u32))]
+    #[arg(long, value_parser = whole(20..=2400u32))]
     dpi: Option<u32>,
     /// Number of tags per row
-    #[arg(long, default_value_t = 5, allow_negative_numbers = true,
+    #[arg(long, default_value_t = 5,
           value_parser = whole(1..=100u16))]
     columns: u16,
     /// Output folder, or the output file if there is only one

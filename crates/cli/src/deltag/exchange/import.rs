@@ -31,10 +31,10 @@ pub struct Args {
     #[arg(long, value_enum)]
     shape: Option<Shape>,
     /// Number of cells of a tag: 9, 16, 25, 36, 49 or 64; not needed for tables with nbits or BITS
-    #[arg(long, allow_negative_numbers = true, value_parser = whole(1..=64u32))]
+    #[arg(long, value_parser = whole(1..=64u32))]
     bits: Option<u32>,
     /// Declared distance between tags, at most the actual one [default: the actual distance]
-    #[arg(long, allow_negative_numbers = true, value_parser = whole(1..=64u32))]
+    #[arg(long, value_parser = whole(1..=64u32))]
     distance: Option<u32>,
     /// Name of the family [default: the stem of the table's file name]
     #[arg(long, value_parser = name, allow_hyphen_values = true)]

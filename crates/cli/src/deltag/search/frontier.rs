@@ -31,11 +31,11 @@ pub struct ChoiceArgs {
     /// Select the complexity rule that keeps the most codes with at most this false-positive rate,
     /// such as 1e-4. The rate is per black-bordered triangle in natural images, with the error
     /// correction of --corrects
-    #[arg(long, value_name = "RATE", allow_negative_numbers = true,
+    #[arg(long, value_name = "RATE",
           value_parser = crate::values::number(1e-15..=1.0))]
     pub false_positives: Option<f64>,
     /// Number of cells corrected in a single tag [default: half of the maximum for this distance]
-    #[arg(long, value_name = "CELLS", requires = "false_positives", allow_negative_numbers = true,
+    #[arg(long, value_name = "CELLS", requires = "false_positives",
           value_parser = crate::values::whole(0..=31u32))]
     pub corrects: Option<u32>,
 }

@@ -53,12 +53,12 @@ pub struct Args {
     /// Time limit in seconds, for best, algebraic and search; longer searches can find larger
     /// families. The method `search` starts no new round after this time [default: 60 for best and
     /// algebraic, unlimited for search]
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true,
+    #[arg(long, value_name = "SECONDS",
           value_parser = number(0.001..=1e6))]
     time: Option<f64>,
     /// Number of work steps for best and algebraic, instead of a time limit: the same seed gives the same codes on
     /// every machine
-    #[arg(long, value_name = "STEPS", conflicts_with = "time", allow_negative_numbers = true,
+    #[arg(long, value_name = "STEPS", conflicts_with = "time",
           value_parser = whole(1..=1_000_000u32))]
     work: Option<u32>,
     /// Start from an empty family instead of the shipped one (methods best and algebraic)
@@ -69,14 +69,14 @@ pub struct Args {
     #[arg(long, value_name = "FAMILY", conflicts_with_all = ["time", "work", "from_scratch", "seed"])]
     extend: Option<String>,
     /// Seed of the random number generator of best, algebraic and search [default: 1]
-    #[arg(long, allow_negative_numbers = true, value_parser = whole(0..=u64::MAX))]
+    #[arg(long, value_parser = whole(0..=u64::MAX))]
     seed: Option<u64>,
     /// Maximum number of rounds with --method search [default: 3, or unlimited with --time]
-    #[arg(long, allow_negative_numbers = true, value_parser = whole(1..=1_000_000u32))]
+    #[arg(long, value_parser = whole(1..=1_000_000u32))]
     rounds: Option<u32>,
     /// Maximum number of codes, for best and algebraic [default: as many as fit in a file of 64
     /// MiB; 20,000 for 49 and 64 bits with --robust-to]
-    #[arg(long, value_name = "CODES", allow_negative_numbers = true,
+    #[arg(long, value_name = "CODES",
           value_parser = whole(1..=u64::MAX))]
     limit: Option<u64>,
     #[command(flatten)]
@@ -95,7 +95,7 @@ pub struct Args {
     #[command(flatten)]
     overwrite: Overwrite,
     /// Number of threads [default: one per processor]
-    #[arg(short = 'j', long, value_name = "N", allow_negative_numbers = true,
+    #[arg(short = 'j', long, value_name = "N",
           value_parser = whole(1..=1024u16))]
     threads: Option<u16>,
 }

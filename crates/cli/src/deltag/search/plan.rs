@@ -15,15 +15,15 @@ use deltille_core::words::counted;
 #[derive(clap::Args)]
 pub struct Args {
     /// Number of faces, or of flat boards
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true,
+    #[arg(long, default_value_t = 1,
           value_parser = whole(1..=u32::MAX))]
     faces: u32,
     /// Number of tags on each face
-    #[arg(long, default_value_t = 10, allow_negative_numbers = true,
+    #[arg(long, default_value_t = 10,
           value_parser = whole(1..=u32::MAX))]
     tags_per_face: u32,
     /// Number of misread cells per tag that the family must be able to correct
-    #[arg(long, value_name = "CELLS", default_value_t = 0, allow_negative_numbers = true,
+    #[arg(long, value_name = "CELLS", default_value_t = 0,
           value_parser = whole(0..=31u32))]
     corrects: u32,
     #[command(flatten)]

@@ -11,12 +11,12 @@ use deltille::limits;
 #[derive(clap::Args)]
 pub struct RuleArgs {
     /// Fraction of edge-adjacent cell pairs that must differ in every code, 0 to 1 [default: 0.5]
-    #[arg(long, value_name = "SHARE", allow_negative_numbers = true,
+    #[arg(long, value_name = "SHARE",
           value_parser = crate::values::number(0.0..=1.0))]
     min_complexity: Option<f64>,
     /// Minimum distance of every code from the all-black word (its minimum number of white cells)
     /// [default: the distance]
-    #[arg(long, value_name = "CELLS", allow_negative_numbers = true,
+    #[arg(long, value_name = "CELLS",
           value_parser = crate::values::whole(0..=64u32))]
     black_distance: Option<u32>,
     /// Require the distance of every code from the all-white word to be at least that of the family

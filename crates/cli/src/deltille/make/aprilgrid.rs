@@ -30,7 +30,7 @@ pub struct Args {
     family: String,
     /// Id of the first tag, at the lower left; the others follow row by row
     #[arg(long, help_heading = TAGS, value_name = "ID", default_value_t = 0,
-          allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
+          value_parser = whole(0..=u32::MAX))]
     first_id: u32,
     /// Width of a tag's black border in cells, 1 to 10; Kalibr supports only 2, most other
     /// detectors only 1
@@ -38,7 +38,7 @@ pub struct Args {
           value_parser = number(1.0..=10.0))]
     tag_border: f64,
     /// Id of the board
-    #[arg(long, value_name = "ID", default_value_t = 0, allow_negative_numbers = true,
+    #[arg(long, value_name = "ID", default_value_t = 0,
           value_parser = whole(0..=u32::MAX))]
     board_id: u32,
     #[command(flatten)]

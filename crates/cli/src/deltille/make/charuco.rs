@@ -27,14 +27,14 @@ pub struct Args {
     dictionary: String,
     /// Id of the first marker; the others follow
     #[arg(long, help_heading = TAGS, value_name = "ID", default_value_t = 0,
-          allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
+          value_parser = whole(0..=u32::MAX))]
     first_id: u32,
     /// Use the pattern of OpenCV before 4.6, which starts with a white square if the number of rows is even (in
     /// OpenCV: setLegacyPattern(true))
     #[arg(long)]
     legacy: bool,
     /// Id of the board
-    #[arg(long, value_name = "ID", default_value_t = 0, allow_negative_numbers = true,
+    #[arg(long, value_name = "ID", default_value_t = 0,
           value_parser = whole(0..=u32::MAX))]
     board_id: u32,
     #[command(flatten)]

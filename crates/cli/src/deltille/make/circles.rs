@@ -22,7 +22,7 @@ pub struct Args {
     #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm)]
     diameter: Option<f64>,
     /// Id of the board
-    #[arg(long, value_name = "ID", default_value_t = 0, allow_negative_numbers = true,
+    #[arg(long, value_name = "ID", default_value_t = 0,
           value_parser = whole(0..=u32::MAX))]
     board_id: u32,
     #[command(flatten)]

@@ -42,7 +42,7 @@ pub struct PrintingArgs {
     #[arg(long, help_heading = PRINT)]
     png: bool,
     /// Resolution of the PNG, 200 to 2400 dots per inch [default: 300]
-    #[arg(long, help_heading = PRINT, allow_negative_numbers = true, value_parser = whole(DPI))]
+    #[arg(long, help_heading = PRINT, value_parser = whole(DPI))]
     dpi: Option<u32>,
     /// Text for the label of every sheet, next to the name, such as the owner
     #[arg(long, value_name = "TEXT")]

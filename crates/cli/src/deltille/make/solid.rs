@@ -81,10 +81,10 @@ pub struct MeshArgs {
     #[arg(long, help_heading = TAGS, value_name = "FAMILY")]
     square_family: Option<String>,
     /// Id of the first square tag on such a mesh [default: 0]
-    #[arg(long, help_heading = TAGS, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
+    #[arg(long, help_heading = TAGS, value_name = "ID", value_parser = whole(0..=u32::MAX))]
     first_square_id: Option<u32>,
     /// Millimetres per unit of the mesh, such as 1000 for metres, 25.4 for inches [default: 1]
-    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, conflicts_with = "edge",
+    #[arg(long, value_name = "FACTOR", conflicts_with = "edge",
           value_parser = number(SCALE))]
     scale: Option<f64>,
     /// Accept faces that are far from equilateral, as long as a board fits

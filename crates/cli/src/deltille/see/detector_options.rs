@@ -51,7 +51,7 @@ pub struct FinderArgs {
     tone: Tone,
     /// Ink spread of the print, the growth of dark areas on every side: µm, none, or auto
     /// (estimated from the corners of each image)
-    #[arg(long, value_name = "UM", default_value = "auto", allow_negative_numbers = true)]
+    #[arg(long, value_name = "UM", default_value = "auto")]
     ink: Ink,
     #[command(flatten)]
     limits: ImageLimits,

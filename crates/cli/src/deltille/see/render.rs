@@ -44,11 +44,11 @@ pub struct Args {
           requires = "eye")]
     up: Option<[f64; 3]>,
     /// Standard deviation of the blur, px
-    #[arg(long, default_value_t = 0.8, value_name = "PX", allow_negative_numbers = true,
+    #[arg(long, default_value_t = 0.8, value_name = "PX",
           value_parser = number(blur_px::RANGE.least..=blur_px::RANGE.most))]
     blur: f64,
     /// Standard deviation of the noise, percent of full scale
-    #[arg(long, default_value_t = 1.0, value_name = "PERCENT", allow_negative_numbers = true,
+    #[arg(long, default_value_t = 1.0, value_name = "PERCENT",
           value_parser = number(0.0..=100.0 * of_full_scale::RANGE.most))]
     noise: f64,
     /// Relative change of the brightness across and down the image

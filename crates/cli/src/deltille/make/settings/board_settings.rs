@@ -41,10 +41,10 @@ pub struct BoardSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     command: Option<String>,
     /// Number of corner rows, 2 to 500
-    #[arg(long, allow_negative_numbers = true, value_parser = whole(SIDES))]
+    #[arg(long, value_parser = whole(SIDES))]
     rows: Option<u32>,
     /// Number of corners per row, 2 to 500
-    #[arg(long, allow_negative_numbers = true, value_parser = whole(SIDES))]
+    #[arg(long, value_parser = whole(SIDES))]
     cols: Option<u32>,
     /// Edge length of a tile, such as 20mm, 2cm, 0.8in [default: 20mm, or the largest whole number of millimetres
     /// that fits --paper]
@@ -71,29 +71,29 @@ pub struct BoardSettings {
     /// Put a tag in every N-th row and column; on a checkerboard, only where that square has the
     /// colour given by --tags-in (for odd N, at every second position) [default: 3; 2 on a
     /// checkerboard]
-    #[arg(long, help_heading = TAGS, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MAX_ROWS))]
+    #[arg(long, help_heading = TAGS, value_name = "N", value_parser = whole(1..=MAX_ROWS))]
     tag_spacing: Option<u32>,
     /// Width of a tag's black border in cells, 0.6 to 10, at least 1 on a checkerboard [default: 1.5; 2 in black
     /// squares, 1 in white ones]
-    #[arg(long, help_heading = TAGS, value_name = "BITS", allow_negative_numbers = true, value_parser = number(BORDER_BITS))]
+    #[arg(long, help_heading = TAGS, value_name = "BITS", value_parser = number(BORDER_BITS))]
     tag_border: Option<f64>,
     /// Diameter of a hole in the middle of each triangular tag, for a screw or a camera; needs a family made with
     /// `deltag gen-family --free centre`
     #[arg(long, help_heading = TAGS, value_name = "DIAMETER", allow_hyphen_values = true)]
     hole: Option<String>,
     /// Id of the first tag; the others follow [default: 0]
-    #[arg(long, help_heading = TAGS, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
+    #[arg(long, help_heading = TAGS, value_name = "ID", value_parser = whole(0..=u32::MAX))]
     first_id: Option<u32>,
     /// Print the id of each tag next to it in small type
     #[arg(long, help_heading = TAGS)]
     #[serde(skip_serializing_if = "is_false")]
     tag_ids: bool,
     /// Id of the first board [default: 0]
-    #[arg(long, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
+    #[arg(long, value_name = "ID", value_parser = whole(0..=u32::MAX))]
     board_id: Option<u32>,
     /// Number of boards, identical except for their ids; each on its own sheet, or several per sheet with --pack
     /// [default: 1]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MAX_ROWS))]
+    #[arg(long, value_name = "N", value_parser = whole(1..=MAX_ROWS))]
     boards: Option<u32>,
     /// Swap black and white: white tiles on black
     #[arg(long)]
@@ -146,7 +146,7 @@ pub struct BoardSettings {
     #[arg(long, help_heading = PRINT, value_name = "DIALECT")]
     dsc_dialect: Option<String>,
     /// Resolution of the PNG, 200 to 2400 dots per inch [default: 300]
-    #[arg(long, help_heading = PRINT, allow_negative_numbers = true, value_parser = whole(DPI))]
+    #[arg(long, help_heading = PRINT, value_parser = whole(DPI))]
     dpi: Option<u32>,
     /// Text for the label of every sheet, next to the name, such as the owner
     #[arg(long, value_name = "TEXT")]

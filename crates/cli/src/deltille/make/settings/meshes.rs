@@ -68,15 +68,15 @@ pub struct Meshes {
     inlay: Option<String>,
     /// Longest side of the texture in px; at least 4 px per tag cell, 12 px on checkerboards [default: 20 px per
     /// cell, limited to 16384 px]
-    #[arg(long, value_name = "PX", allow_negative_numbers = true, value_parser = whole(SIDE_PX))]
+    #[arg(long, value_name = "PX", value_parser = whole(SIDE_PX))]
     texture: Option<u32>,
     /// Distribute the faces over N textures. With --texture, each has that size, so the resolution
     /// is higher; without it, the resolution is the same, but the files are smaller [default: 1]
-    #[arg(long, value_name = "N", allow_negative_numbers = true,
+    #[arg(long, value_name = "N",
           value_parser = whole(1..=MAX_TEXTURES))]
     textures: Option<u32>,
     /// Resolution of the texture in dots per inch, instead of --texture
-    #[arg(long, value_name = "DPI", allow_negative_numbers = true, conflicts_with = "texture",
+    #[arg(long, value_name = "DPI", conflicts_with = "texture",
           value_parser = number(TEXTURE_DPI))]
     texture_dpi: Option<f64>,
 }

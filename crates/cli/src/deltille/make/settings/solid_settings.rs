@@ -50,7 +50,7 @@ pub struct SolidSettings {
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     pub edge: Option<String>,
     /// Number of black tiles along each side of a face, 6 to 200 [default: 10]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(FACE_TILES))]
+    #[arg(long, value_name = "N", value_parser = whole(FACE_TILES))]
     pub tiles: Option<u32>,
     /// Blank margin between the edges of a face and its tiles [default: 5mm; at least 3 mm on the panels of a
     /// skeleton]
@@ -75,24 +75,24 @@ pub struct SolidSettings {
     #[serde(skip_serializing_if = "is_false")]
     pub invert: bool,
     /// Put a tag in every N-th row and column of a face [default: 3]
-    #[arg(long, help_heading = TAGS, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MAX_ROWS))]
+    #[arg(long, help_heading = TAGS, value_name = "N", value_parser = whole(1..=MAX_ROWS))]
     pub tag_spacing: Option<u32>,
     /// Width of a tag's black border in cells [default: 1.5]
-    #[arg(long, help_heading = TAGS, value_name = "BITS", allow_negative_numbers = true, value_parser = number(BORDER_BITS))]
+    #[arg(long, help_heading = TAGS, value_name = "BITS", value_parser = number(BORDER_BITS))]
     pub tag_border: Option<f64>,
     /// Diameter of a hole in the middle of each triangular tag, for a screw or a camera; needs a family made with
     /// `deltag gen-family --free centre`
     #[arg(long, help_heading = TAGS, value_name = "DIAMETER", allow_hyphen_values = true)]
     pub hole: Option<String>,
     /// Id of the first tag; the others follow, face by face [default: 0]
-    #[arg(long, help_heading = TAGS, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
+    #[arg(long, help_heading = TAGS, value_name = "ID", value_parser = whole(0..=u32::MAX))]
     pub first_id: Option<u32>,
     /// Print the id of each tag next to it in small type
     #[arg(long, help_heading = TAGS)]
     #[serde(skip_serializing_if = "is_false")]
     pub tag_ids: bool,
     /// Id of the first face's board; the others follow [default: 0]
-    #[arg(long, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
+    #[arg(long, value_name = "ID", value_parser = whole(0..=u32::MAX))]
     pub board_id: Option<u32>,
     /// Write <name>.stl, the bare solid (millimetres)
     #[arg(long, help_heading = BODIES)]
