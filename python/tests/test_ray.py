@@ -180,4 +180,4 @@ def test_the_example(root, shots, target, tmp_path):
     command = [sys.executable, root / "python/examples/cluster.py", description, shots, tmp_path / "found"]
     done = subprocess.run([f"{part}" for part in command], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert "10 pictures" in done.stdout and "1 errors, 0 skipped" in done.stdout and "broken.png: " in done.stdout
+    assert "10 images" in done.stdout and "1 errors, 0 skipped" in done.stdout and "broken.png: " in done.stdout
