@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 
 use super::effort::Effort;
-use super::gaps::fill_gaps;
+use super::gaps::fill::fill_gaps;
 use super::grow::{Growth, Place, Placed, seeds};
-use super::links::links;
+use super::links::link::links;
 use super::outer_edges::trim;
 use super::outline::WholeBoard;
 use super::parts::join;

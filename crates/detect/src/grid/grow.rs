@@ -12,7 +12,7 @@
 
 use std::collections::{HashSet, VecDeque};
 
-use super::links::{Link, Links};
+use super::links::link::{Link, Links};
 use crate::tiling::{kind, step};
 use deltille_core::lattice::{GridKind, Vertex};
 

@@ -14,7 +14,7 @@
 
 use glam::DVec2;
 
-use super::links::MAX_CONTRAST_RATIO;
+use super::links::link::MAX_CONTRAST_RATIO;
 use super::saddle_grid::{Growing, GrownSaddle};
 use crate::tiling::{CHECKER, step};
 use deltille_core::lattice::Vertex;

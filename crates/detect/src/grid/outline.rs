@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec2;
 
-use super::local_map::{LocalMap, Shape};
+use super::map::local_map::{LocalMap, Shape};
+use super::map::spacing::Spacing;
 use super::saddle_grid::SaddleGrid;
-use super::spacing::Spacing;
 use crate::tiling::CHECKER;
 use deltille_core::lattice::{GridKind, LatticeMap, Vertex};
 

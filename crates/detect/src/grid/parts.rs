@@ -10,10 +10,10 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use super::edge::{End, MAX_CHORD_RAD, is_clean};
 use super::effort::Effort;
-use super::links::MAX_CONTRAST_RATIO;
-use super::local_map::{LocalMap, Shape};
+use super::links::edge::{End, MAX_CHORD_RAD, is_clean};
+use super::links::link::MAX_CONTRAST_RATIO;
+use super::map::local_map::{LocalMap, Shape};
 use super::saddle_grid::{Growing, GrownSaddle};
 use crate::corners::buckets::Buckets;
 use crate::corners::saddles::Saddle;

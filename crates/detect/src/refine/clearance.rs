@@ -14,9 +14,9 @@ use std::f64::consts::PI;
 
 use glam::{DMat2, DVec2};
 
-use crate::grid::edge_crossing::Neighbour;
-use crate::grid::local_map::{LocalMap, Shape};
-use crate::grid::spacing::Spacing;
+use crate::grid::gaps::edge_crossing::Neighbour;
+use crate::grid::map::local_map::{LocalMap, Shape};
+use crate::grid::map::spacing::Spacing;
 use crate::refine::model::window::Border;
 use crate::tiling::{CHECKER, DELTILLE};
 use deltille_core::detection::{Grid, GridCorner};

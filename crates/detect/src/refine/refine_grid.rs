@@ -22,7 +22,7 @@ use super::refiner::{
     USUAL_MIN_PIXELS,
 };
 use super::shared_optics::{REACH_PX, REACH_SIGMAS, SAMPLES};
-use crate::grid::edge_crossing::EdgeCrossing;
+use crate::grid::gaps::edge_crossing::EdgeCrossing;
 use deltille_core::detection::{Grid, GridCorner};
 use deltille_core::lattice::Vertex;
 use deltille_core::raster::{Gray, ImageView, Pyramid};

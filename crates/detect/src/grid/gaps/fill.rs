@@ -4,17 +4,17 @@ use std::collections::BTreeSet;
 
 use glam::DVec2;
 
-use super::edge::{End, MAX_CHORD_RAD, is_clean_somehow};
 use super::edge_crossing::{EdgeCrossing, Neighbour};
-use super::effort::Effort;
-use super::links::{facing_ray, have_similar_contrast};
-use super::local_map::{LocalMap, Shape};
 use super::rectified::Rectified;
-use super::saddle_grid::{Growing, GrownSaddle};
-use super::spacing::Spacing;
-use super::untagged::checker_tiles::parity;
 use crate::corners::saddles::{Saddle, SaddleFinder};
 use crate::corners::sectors::{Sectors, turn};
+use crate::grid::effort::Effort;
+use crate::grid::links::edge::{End, MAX_CHORD_RAD, is_clean_somehow};
+use crate::grid::links::link::{facing_ray, have_similar_contrast};
+use crate::grid::map::local_map::{LocalMap, Shape};
+use crate::grid::map::spacing::Spacing;
+use crate::grid::saddle_grid::{Growing, GrownSaddle};
+use crate::grid::untagged::checker_tiles::parity;
 use crate::tiling::{kind, neighbours, step};
 use deltille_core::lattice::Vertex;
 use deltille_core::raster::Pyramid;
@@ -26,7 +26,7 @@ const MAX_SURPRISE: f64 = 0.2;
 const LOOKS_FOR_CORNER: usize = 20;
 
 /// Searches for corners at the empty vertices within a grid and around it, until no more are found.
-pub(super) fn fill_gaps<const N: usize>(
+pub(crate) fn fill_gaps<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
     grid: &mut Growing<N>,

@@ -18,8 +18,8 @@ use std::collections::BTreeSet;
 use glam::DVec2;
 use nalgebra::{DMatrix, DVector};
 
-use super::edge::MAX_CHORD_RAD;
-use super::links::MAX_CONTRAST_RATIO;
+use crate::grid::links::edge::MAX_CHORD_RAD;
+use crate::grid::links::link::MAX_CONTRAST_RATIO;
 use crate::tiling::CHECKER;
 use deltille_core::raster::ImageView;
 use deltille_core::statistics::median;

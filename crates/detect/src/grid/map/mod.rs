@@ -1,0 +1,9 @@
+//! Positions of corners of a grid predicted from their neighbours.
+//!
+//! Input: corners with lattice coordinates. Output: the predicted position of any other vertex, with its error.
+//!
+//! 1. `spacing` measures whether rows and columns are wide and narrow in turn, as on an AprilGrid.
+//! 2. `local_map` fits a smooth map from the lattice to the image to the nearest corners.
+
+pub(crate) mod local_map;
+pub(crate) mod spacing;
