@@ -13,10 +13,12 @@ from .typing import (
     CameraFormat,
     CameraModel,
     Candidate,
+    DetectionFormat,
     Floats,
     Ints,
     Loss,
     Orientation,
+    RigFormat,
     Source,
     TargetFormat,
     TargetIdentity,
@@ -649,7 +651,7 @@ class Detection:
     ) -> Detection: ...
     def to_json(self) -> str: ...
     def save(
-        self, path: AnyPath, format: Literal["json", "csv", "orpc"] = "json", *, overwrite: bool = False
+        self, path: AnyPath, format: DetectionFormat = "json", *, overwrite: bool = False
     ) -> Path: ...
     @property
     def image(self) -> str: ...
@@ -957,7 +959,7 @@ class Rig:
     def save(
         self,
         path: AnyPath,
-        format: Literal["json", "kalibr", "colmap", "colmap-rig"] = "json",
+        format: RigFormat = "json",
         *,
         residuals: bool = False,
         overwrite: bool = False,

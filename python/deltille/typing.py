@@ -21,6 +21,7 @@ Tiling: TypeAlias = Literal["deltille", "checker"]
 Source: TypeAlias = Literal["noise", "observed"]
 Loss: TypeAlias = Literal["huber", "cauchy", "none"]
 Weights: TypeAlias = Literal["covariance", "equal"]
+# list: names (written by tests/it/files/lists.rs)
 TargetFormat: TypeAlias = Literal[
     "json",
     "pdf",
@@ -47,8 +48,26 @@ TargetFormat: TypeAlias = Literal[
     "laser-svg",
     "kalibr",
 ]
-CameraFormat: TypeAlias = Literal["own", "opencv", "ros", "kalibr", "colmap", "nerfstudio", "mrcal"]
-
+DetectionFormat: TypeAlias = Literal[
+    "json",
+    "orpc",
+    "csv",
+]
+CameraFormat: TypeAlias = Literal[
+    "own",
+    "opencv",
+    "ros",
+    "kalibr",
+    "colmap",
+    "nerfstudio",
+    "mrcal",
+]
+RigFormat: TypeAlias = Literal[
+    "json",
+    "kalibr",
+    "colmap",
+    "colmap-rig",
+]
 CameraModel: TypeAlias = Literal[
     "pinhole",
     "fisheye",
@@ -61,6 +80,7 @@ CameraModel: TypeAlias = Literal[
     "thin-prism",
     "kannala-brandt",
 ]
+# end of list
 
 class _Identity(TypedDict):
     name: str

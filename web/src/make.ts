@@ -28,7 +28,9 @@ const PROVED_BY_ALL = "json";
 const types: Record<string, string> = { pdf: "application/pdf", svg: "image/svg+xml", png: "image/png", json: "application/json" };
 /** Ids are 32-bit numbers. */
 const MAX_IDS = 2 ** 32 - 1;
-const papers = ["A5", "A4", "A3", "A2", "A1", "A0", "letter", "legal", "tabloid"];
+// list: papers (written by tests/it/files/lists.rs)
+const papers = ["A0", "A1", "A2", "A3", "A4", "A5", "letter", "legal", "tabloid"];
+// end of list
 
 export function make(): HTMLElement {
   let settings: Settings = read(location.hash.split("?")[1] ?? "");

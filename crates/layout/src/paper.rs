@@ -158,10 +158,14 @@ pub enum PaperError {
 }
 
 impl PaperSize {
+    /// Iterates over the named sizes.
+    pub fn all() -> impl DoubleEndedIterator<Item = PaperSize> {
+        SIZES.iter().map(|&(name, sides)| Self::named(name, sides))
+    }
+
     /// Iterates over the sizes tried by default, smallest first: A4 to A0.
     pub fn automatic() -> impl Iterator<Item = PaperSize> {
-        let from_a4 = SIZES.iter().rev().skip_while(|(name, _)| *name != "A4");
-        from_a4.map(|&(name, sides)| Self::named(name, sides))
+        Self::all().rev().skip_while(|size| size.name != "A4")
     }
 
     /// Describes the accepted values: the named sizes, and an example of a custom size.
