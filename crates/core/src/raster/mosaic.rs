@@ -100,13 +100,11 @@ impl<T: Intensity + TryFrom<u32> + Ord, const N: usize> Planes<'_, T, N> {
     fn flat_squares(&self) -> Vec<[usize; 2]> {
         let [across, down] = [self.width, self.height].map(|side| side / SQUARE_PX);
         let every = (across * down).div_ceil(MOST_SQUARES).max(1);
-        let mut found = Vec::new();
-        for square in (0..across * down).step_by(every) {
-            let first = [square % across, square / across].map(|i| i * SQUARE_PX);
-            if let Some((variance, _)) = self.noise(first, &|_, _| 1) {
-                found.push((variance, first));
-            }
-        }
+        // First a coarse raster, then those between them until there are enough: where white is clipped, few show noise.
+        let squares = (0..every).flat_map(|first| (first..across * down).step_by(every));
+        let firsts = squares.map(|at| [at % across, at / across].map(|i| i * SQUARE_PX));
+        let noisy = firsts.filter_map(|first| Some((self.noise(first, &|_, _| 1)?.0, first)));
+        let mut found: Vec<_> = noisy.take(MOST_SQUARES).collect();
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
         found.truncate(found.len().div_ceil(4));
         found.into_iter().map(|(_, first)| first).collect()

@@ -87,6 +87,16 @@ impl<const K: usize> From<Sample> for Member<K> {
     }
 }
 
+impl<const K: usize> Member<K> {
+    /// Returns the corner with its contrast multiplied by a factor, at the same black.
+    pub(super) fn brighter(&self, factor: f64) -> Self {
+        let mut member = self.clone();
+        member.corner.level += (factor - 1.0) * member.corner.amplitude.abs();
+        member.corner.amplitude *= factor;
+        member
+    }
+}
+
 /// Corners to be fitted together.
 pub(super) struct Problem<'a, const K: usize> {
     pub(super) fitter: &'a mut CornerFitter,
@@ -297,6 +307,13 @@ impl<const K: usize> Problem<'_, K> {
         there
     }
 
+    /// Returns the covariance of corner positions due to the uncertainty of the active parameters, px².
+    pub(super) fn shift(&self, at: &Linearised<K>) -> [f64; 3] {
+        let weights = weights_of(&at.equations);
+        let reduced = self.reduced(at, &weights);
+        covariance(&reduced).map_or(at.optics.shift, |cov| reduced.shift(&cov, &weights))
+    }
+
     /// Returns the corners of the members.
     fn corners(&self) -> Vec<Corner<K>> {
         self.members.iter().map(|member| member.corner).collect()
@@ -415,10 +432,14 @@ impl<const K: usize> Problem<'_, K> {
     }
 }
 
+/// Returns the median noise of corners.
+pub(super) fn noise_of(equations: &[Option<Joint>]) -> f64 {
+    median(equations.iter().flatten().map(|joint| joint.noise).collect()).unwrap_or(1.0)
+}
+
 /// Returns the weights of corners: the inverse of their noise, limited to that of the median corner.
 pub(super) fn weights_of(equations: &[Option<Joint>]) -> Vec<f64> {
-    let noises = equations.iter().flatten().map(|joint| joint.noise).collect();
-    let middle = median(noises).unwrap_or(1.0);
+    let middle = noise_of(equations);
     let weight = |joint: &Option<Joint>| match joint {
         Some(joint) if joint.noise <= MAX_RESIDUAL_RATIO * middle => {
             1.0 / joint.noise.max(middle).powi(2)

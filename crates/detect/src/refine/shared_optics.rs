@@ -9,7 +9,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::joint_fit::{Member, Problem, Sample, weights_of};
+use super::joint_fit::{Linearised, Member, Problem, Sample, noise_of, weights_of};
 use super::model::fitter::CornerFitter;
 use super::optics::{CROSS, HALO, INK, Optics, PARAMS};
 use deltille_core::detection::{InkEstimate, TONE_PARAMS, ToneEstimate};
@@ -30,6 +30,11 @@ pub(crate) const REACH_SIGMAS: f64 = 5.0;
 /// Minimum evidence at which a group is estimated, as a fraction of its threshold. The first step,
 /// from a straight curve, predicts the evidence.
 const WORTH_ESTIMATING: f64 = 0.5;
+
+/// Whites from which the fit starts if the image is clipped, relative to the brightest one that it shows. From a start
+/// at the limit of the sensor, the fit may end where dark areas have shrunk instead. Light that is clipped at less than
+/// 0.4 of white hides the middle of the edges.
+const CLIPPED_WHITES: [f64; 3] = [1.0, 1.5, 2.5];
 
 impl Optics {
     /// Estimates the optics from the corners of an image; a known tone curve is kept.
@@ -52,53 +57,32 @@ impl Optics {
         let residuals = samples.iter().map(|sample| sample.residual).collect();
         let plain_residual = median(residuals).unwrap_or(0.0);
         let known = Self { range, plain_residual, ..known.clone() };
+        let is_clipped = range[1] >= 1.0;
         let is_active = |p: usize| match p {
             0..TONE_PARAMS => known.is_open,
             INK => known.is_ink_open,
             // Of a clipped edge, only the dark side shows its profile. Two edges do not move with their blur, and
             // where their halves have parted, the profile of a gap would be taken for that of an edge.
-            CROSS.. if p < HALO => K == 3 && range[1] < 1.0,
+            CROSS.. if p < HALO => K == 3 && !is_clipped,
             _ => true,
         };
-        let members = samples.into_iter().map(Member::from).collect();
+        let members: Vec<Member<K>> = samples.into_iter().map(Member::from).collect();
         let greys = [blacks, whites].map(|greys| median(greys).unwrap_or(0.0));
         let all: Vec<usize> = (0..PARAMS).filter(|&p| is_active(p)).collect();
         let active = all.clone();
-        let mut problem = Problem::<K> { fitter, image, members, greys, all, active };
-        let reported = |problem: &Problem<K>, optics: &Self, cov: &DMatrix<f64>, used| Reported {
-            tone: optics.tone_between(greys, cov, &problem.active, used),
-            ink: problem.ink(optics, cov, used),
+        let mut problem = Problem { fitter, image, members: Vec::new(), greys, all, active };
+        let mut fitted = |white: f64| {
+            problem.members = members.iter().map(|member| member.brighter(white)).collect();
+            let range = [range[0], range[0] + white * (range[1] - range[0])];
+            let (optics, at, found) = problem.chosen(Self { range, ..known.clone() }, is_clipped);
+            (noise_of(&at.equations), problem.members.clone(), optics, found)
         };
-        let mut optics = known.clone();
-        let mut at = problem.linearised(known);
-        let (mut used, mut found) = (Vec::new(), Reported::default());
-        // The first step selects the groups to estimate. There, model errors scatter the gradients.
-        // They do not exclude a group, but increase the reported standard deviation. A step from a
-        // straight curve reveals little about effects that are weak compared with the curve. A step
-        // from a Gaussian reveals little about motion. So all groups are tested once more.
-        for is_first in [true, false] {
-            problem.active.clone_from(&problem.all);
-            let reduced = problem.reduced(&at, &weights_of(&at.equations));
-            let (step, scattered) = problem.first_step(&at.optics, &reduced);
-            let unused = reported(&problem, &at.optics.with(&step.vector), &scattered, false);
-            let worth = match is_first {
-                true => step.supported(WORTH_ESTIMATING),
-                false => problem.estimate(&at.optics, step.vector, &scattered).supported(1.0),
-            };
-            if worth.active == used {
-                found = found.or(unused);
-                break;
-            }
-            if !is_first {
-                let start = problem.stepped(&at, &reduced, &worth.vector);
-                at = problem.linearised(start);
-            }
-            problem.active = worth.active;
-            let settled = problem.settled(at);
-            used.clone_from(&problem.active);
-            found = reported(&problem, &settled.optics, &settled.cov, true).or(unused);
-            (optics, at) = (settled.optics, settled.at);
-        }
+        let starts = if is_clipped { &CLIPPED_WHITES[..] } else { &[1.0] };
+        let fits = starts.iter().map(|&white| fitted(white));
+        let Some((_, members, optics, found)) = fits.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+            return known;
+        };
+        problem.members = members;
         let inflation = problem.inflation(&optics);
         Self { tone: found.tone, ink_found: found.ink, inflation, ..optics }
     }
@@ -121,6 +105,53 @@ impl Optics {
             (tone.kappa_odd, tone.used) = (kappa_odd, used);
             tone
         })
+    }
+}
+
+impl<const K: usize> Problem<'_, K> {
+    /// Returns the optics with the groups of parameters that are significant, the equations there, and the estimates to
+    /// report.
+    fn chosen(&mut self, known: Optics, is_clipped: bool) -> (Optics, Linearised<K>, Reported) {
+        let reported = |problem: &Self, optics: &Optics, cov: &DMatrix<f64>, used| Reported {
+            tone: optics.tone_between(problem.greys, cov, &problem.active, used),
+            ink: problem.ink(optics, cov, used),
+        };
+        let mut optics = known.clone();
+        let mut at = self.linearised(known);
+        let (mut used, mut found) = (Vec::new(), Reported::default());
+        // The first step selects the groups to estimate. There, model errors scatter the gradients.
+        // They do not exclude a group, but increase the reported standard deviation. A step from a
+        // straight curve reveals little about effects that are weak compared with the curve. A step
+        // from a Gaussian reveals little about motion. So all groups are tested once more.
+        for is_first in [true, false] {
+            self.active.clone_from(&self.all);
+            let reduced = self.reduced(&at, &weights_of(&at.equations));
+            let (step, scattered) = self.first_step(&at.optics, &reduced);
+            let unused = reported(self, &at.optics.with(&step.vector), &scattered, false);
+            let worth = match is_first {
+                true => step.supported(WORTH_ESTIMATING),
+                false => self.estimate(&at.optics, step.vector, &scattered).supported(1.0),
+            };
+            if worth.active == used {
+                found = found.or(unused);
+                break;
+            }
+            if !is_first {
+                let start = self.stepped(&at, &reduced, &worth.vector);
+                at = self.linearised(start);
+            }
+            self.active = worth.active;
+            let settled = self.settled(at);
+            used.clone_from(&self.active);
+            found = reported(self, &settled.optics, &settled.cov, true).or(unused);
+            (optics, at) = (settled.optics, settled.at);
+        }
+        // Symmetry cancels the effect of a wrong blur on a corner only if grey values are linear.
+        if used.contains(&0) && !is_clipped {
+            self.active.clone_from(&self.all);
+            optics.shift = self.shift(&at);
+        }
+        (optics, at, found)
     }
 }
 
