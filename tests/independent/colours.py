@@ -4,7 +4,7 @@
 
 A page drawn by cairo is seen through a Bayer mosaic with raw noise, whose planes OpenCV interpolates. The rows are: a
 monochrome sensor for comparison; interpolation along edges, with a linear and an sRGB curve, and by variable gradients;
-white beyond what the sensor can show; a telephone (denoised, sharpened, S-shaped contrast, JPEG 92); and the image
+white at 1.9 and 2.5 times what the sensor can show; a telephone (denoised, sharpened, S-shaped contrast, JPEG 92); and the image
 reduced by half after interpolation.
 """
 
@@ -30,6 +30,7 @@ LIMITS = {
     "along edges, sRGB": 0.007,
     "variable gradients": 0.007,
     "white at 1.9": 0.007,
+    "white at 2.5": 0.007,
     "telephone": 0.013,
     "reduced by half": 0.005,
 }
@@ -67,6 +68,7 @@ def pictures(light, rng):
     yield "along edges, sRGB", eight_bits(SRGB(along(1)))
     yield "variable gradients", eight_bits(interpolated(light.copy(), 1, cv2.COLOR_BayerBG2BGR_VNG, 255, rng))
     yield "white at 1.9", eight_bits(SRGB(along(3)))
+    yield "white at 2.5", eight_bits(SRGB(along(4)))
     yield "telephone", telephone(along(1))
     reduced = cv2.resize(along(1), None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
     yield "reduced by half", eight_bits(reduced)

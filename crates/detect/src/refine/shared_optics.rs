@@ -146,10 +146,12 @@ impl<const K: usize> Problem<'_, K> {
             found = reported(self, &settled.optics, &settled.cov, true).or(unused);
             (optics, at) = (settled.optics, settled.at);
         }
-        // Symmetry cancels the effect of a wrong blur on a corner only if grey values are linear.
+        // Symmetry cancels the effect of a wrong blur on a corner only if grey values are linear. Otherwise, a group that
+        // is not significant may be zero, or as uncertain as it is: the mean of both.
         if used.contains(&0) && !is_clipped {
             self.active.clone_from(&self.all);
-            optics.shift = self.shift(&at);
+            let uncertain = self.shift(&at);
+            optics.shift = [0, 1, 2].map(|i| (optics.shift[i] + uncertain[i]) / 2.0);
         }
         (optics, at, found)
     }

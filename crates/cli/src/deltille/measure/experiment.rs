@@ -137,9 +137,9 @@ struct CornersArgs {
 
 #[derive(clap::Args)]
 struct PhotographsArgs {
-    /// Parameters to vary: blur, motion, noise, jpeg, tone, exposure, contrast, tilt, distance, covers, glare, curl,
-    /// scale, mosaic, sharpening, light, background [default: all]
-    #[arg(long, value_name = "AXIS", value_delimiter = ',')]
+    #[arg(long, value_name = "AXIS", value_delimiter = ',', help = format!(
+        "Parameters to vary: {} [default: all]", Axis::ALL.map(Axis::name).join(", ")
+    ))]
     axis: Vec<Axis>,
     /// Boards with 20 mm tiles: deltille and checker, with tags; deltille-untagged, checker-untagged; all
     #[arg(long, value_name = "KIND", value_delimiter = ',', default_value = "deltille",
