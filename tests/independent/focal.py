@@ -3,8 +3,8 @@
     python focal.py path/to/deltille FOLDER [SEEDS [TONE [INK_UM]]]
 
 photographs a page rendered by cairo with a pinhole camera of known focal length, eight views per seed, calibrates from
-the detections of `deltille detect`, and prints the error of the focal length in units of its standard deviation. Needs
-numpy, OpenCV and pdftocairo.
+the detections of `deltille detect`, and prints the error of the focal length in units of its standard deviation. The
+tone `telephone` is the colour sensor with all processing of colours.py. Needs numpy, OpenCV and pdftocairo.
 """
 
 import json
@@ -15,7 +15,8 @@ import cv2
 import numpy as np
 
 from check import TARGETS, run
-from photograph import Page, Scene, photograph
+from colours import interpolated, telephone
+from photograph import Page, Scene, View, look, photograph
 
 VIEWS = 8
 FOCAL_PX = 600.0
@@ -27,8 +28,13 @@ def deviation(deltille, page, target, folder, seed, tone, ink_um):
     folder.mkdir(exist_ok=True)
     for view in range(VIEWS):
         tilt = float(np.random.default_rng([seed, view, 1]).uniform(*TILTS_DEG))
-        scene = Scene(800, 600, FOCAL_PX, tilt_deg=tilt, tone=tone, ink_um=ink_um)
-        image, _ = photograph(page, scene, [seed, view, 2])
+        if tone == "telephone":
+            scene, rng = Scene(800, 600, FOCAL_PX, tilt_deg=tilt, ink_um=ink_um), np.random.default_rng([seed, view, 2])
+            light = look(page, View(page, scene, rng), scene).astype(float)
+            image = telephone(interpolated(light, 1, cv2.COLOR_BayerBG2BGR_EA, 65535, rng))
+        else:
+            scene = Scene(800, 600, FOCAL_PX, tilt_deg=tilt, tone=tone, ink_um=ink_um)
+            image, _ = photograph(page, scene, [seed, view, 2])
         cv2.imwrite(str(folder / f"{view}.png"), image)
     images = sorted(folder.glob("*.png"))
     run(deltille, "detect", *images, "--target", target, "-o", folder / "corners")
