@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
+import subprocess
 import sysconfig
 from pathlib import Path
 
@@ -38,6 +40,16 @@ def script(name: str) -> str:
     found = shutil.which(name, path=sysconfig.get_path("scripts"))
     assert found, f"{name} is not installed"
     return found
+
+
+def started(command, **options):
+    """A program that ignores no signal, although a shell that runs the tests in the background may ignore some."""
+
+    def default():
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, signal.SIG_DFL)
+
+    return subprocess.Popen(command, preexec_fn=None if os.name == "nt" else default, **options)
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from conftest import script
+from conftest import script, started
 
 
 def run(name, *arguments, **options):
@@ -33,12 +33,6 @@ def test_errors_have_an_exit_code_and_one_line(tmp_path):
     (tmp_path / "a.pgm").write_bytes(b"P5 640 480 255\n" + bytes(640 * 480))
     done = run("deltille", "detect", "--grid", "deltille", "a.pgm", cwd=tmp_path)
     assert done.returncode == 1 and "dark" in done.stdout
-
-
-def started(command, **options):
-    """A program that does not ignore SIGINT, although a shell that runs the tests in the background may do so."""
-    default = None if os.name == "nt" else lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)
-    return subprocess.Popen(command, preexec_fn=default, **options)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of Unix")

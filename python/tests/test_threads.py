@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy
 import pytest
+from conftest import started
 
 import deltille
 
@@ -92,7 +93,7 @@ except KeyboardInterrupt:
 @pytest.mark.parametrize("what", LONG)
 def test_ctrl_c_ends_long_work(what, tmp_path):
     code = SETUP.format(work=LONG[what], calibrates=what == "calibrate")
-    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = started([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout.readline() == "ready\n"
     time.sleep(0.4)
     start = time.monotonic()
