@@ -112,6 +112,10 @@ fn lists_are_those_of_the_library() {
         };
         format!("| `{name}` | `{}` | `{names}` | {} |", model.kind().name(), code(model.richer()))
     });
+    let calibration = read("docs/calibration.md");
+    for (name, _) in Model::named() {
+        assert!(calibration.contains(&format!("`{name}`")), "{name}");
+    }
     let head =
         "| `--model` | `model` in `camera.yaml` | estimated lens parameters | richer models |";
     compare("docs/formulation.md", "models", &table(head, models));

@@ -75,7 +75,7 @@ impl Optics {
             problem.members = members.iter().map(|member| member.brighter(white)).collect();
             let range = [range[0], range[0] + white * (range[1] - range[0])];
             let (optics, at, found) = problem.chosen(Self { range, ..known.clone() }, is_clipped);
-            (noise_of(&at.equations), problem.members.clone(), optics, found)
+            (noise_of(&at.equations), std::mem::take(&mut problem.members), optics, found)
         };
         let starts = if is_clipped { &CLIPPED_WHITES[..] } else { &[1.0] };
         let fits = starts.iter().map(|&white| fitted(white));
