@@ -21,7 +21,9 @@ use crate::refine::optics::Optics;
 use crate::refine::refine_grid::{Level, is_sampled, sharp_level};
 use crate::refine::refiner::Refiner;
 use crate::transformed::enlarged::enlarged_grids;
-use crate::transformed::foreshortened::foreshortened_grids;
+use crate::transformed::foreshortened::{
+    all_directions, foreshortened_direction, foreshortened_grids,
+};
 use crate::transformed::moved_edges::grids_of_moved_edges;
 use deltille_core::Clock;
 use deltille_core::detection::{
@@ -285,11 +287,12 @@ impl OneTiling {
             grids = with_larger_panels(grids, found);
             timing.lap("enlarged");
         }
-        if grids.is_empty() && self.labels.are_wanted() {
-            let found = foreshortened_grids(finder, pyramid);
-            grids = self.plausible::<N>(frame, &found, &mut left_out);
+        let directions = self.foreshortened_directions::<N>(&found, &grids);
+        if !directions.is_empty() {
+            let foreshortened = foreshortened_grids(finder, pyramid, &directions);
             // Foreshortened patterns of all kinds contain triangles and squares too.
-            grids.retain(|(grid, _)| is_labelled(grid));
+            let left_out = if grids.is_empty() { &mut left_out } else { &mut Vec::new() };
+            grids = with_larger_panels(grids, self.plausible::<N>(frame, &foreshortened, left_out));
             timing.lap("foreshortened");
         }
         if self.is_sought() && !grids.iter().any(|found| self.is_identified(found)) {
@@ -328,6 +331,24 @@ impl OneTiling {
         match labelled.clone().count() {
             0 => true,
             _ => labelled.any(|grid| grid.corners.len() < whole && is_near(grid)),
+        }
+    }
+
+    /// Returns the directions in which tiles may be seen that are missing because they are foreshortened, radians: that of
+    /// the largest grid if it is foreshortened and not whole, and all if there is no grid.
+    fn foreshortened_directions<const N: usize>(
+        &self,
+        found: &[SaddleGrid],
+        grids: &Judged,
+    ) -> Vec<f64> {
+        let whole = self.labels.whole().map_or(usize::MAX, |whole| whole.corners());
+        let is_whole = |(grid, _): &(Grid, _)| is_labelled(grid) && grid.corners.len() >= whole;
+        match found.first() {
+            _ if !self.labels.are_wanted() || grids.iter().any(is_whole) => Vec::new(),
+            Some(largest) if !grids.is_empty() => {
+                foreshortened_direction::<N>(largest).into_iter().collect()
+            }
+            _ => all_directions(),
         }
     }
 

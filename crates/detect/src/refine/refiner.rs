@@ -200,6 +200,8 @@ pub struct Refiner {
     tone: Tone,
     /// Optics known before any image.
     pub(crate) known: Optics,
+    /// The same with a usual tone curve, if it is unknown.
+    toned: Option<Optics>,
 }
 
 impl Refiner {
@@ -227,6 +229,7 @@ impl Refiner {
             windows,
             tone: Tone::Linear,
             known: Optics::default(),
+            toned: None,
         }
     }
 
@@ -237,7 +240,8 @@ impl Refiner {
 
     /// Sets the tone curve of the camera; by default, grey values are linear in light.
     pub fn with_tone(self, tone: Tone) -> Self {
-        Self { tone, known: Optics::of(tone), ..self }
+        let toned = (tone == Tone::Auto).then(|| Optics::of(Tone::Srgb));
+        Self { tone, known: Optics::of(tone), toned, ..self }
     }
 
     /// Sets the ink spread of the print, in edges of a tile; `None` if it is unknown.
@@ -426,10 +430,14 @@ impl Refiner {
         let bends = edges.map(|edge| edge.bend);
         let across_px = edges.map(|edge| edge.across_px);
         let first = Corner { bends, across_px, ..first };
-        // The shared optics may not apply near the border of an image.
-        let fit = fitter
-            .fit(image, window, &first, room.optics, accuracy)
-            .or_else(|| fitter.fit(image, window, &first, &self.known, accuracy))?;
+        // The shared optics may not apply near the border of an image. If no tone curve is known, a strong one may move
+        // edges that are almost parallel far from their positions.
+        let are_shared = *room.optics != self.known;
+        let known = are_shared.then_some(&self.known);
+        let is_rough = before.is_none() && !room.optics.is_toned();
+        let toned = self.toned.as_ref().filter(|_| is_rough);
+        let mut tried = [Some(room.optics), known, toned].into_iter().flatten();
+        let fit = tried.find_map(|optics| fitter.fit(image, window, &first, optics, accuracy))?;
         Some(fit.into())
     }
 

@@ -1,9 +1,9 @@
 //! Detects boards at a grazing angle in images that are compressed along their tiles.
 //!
-//! From 75° on, a tile is four times as wide as it is high, and its sectors are 15° wide. A circle
-//! that is large enough to show them extends beyond the tile. The image is compressed to half its
+//! At 75°, a tile is four times as wide as it is high, and its sectors are 15° wide. A circle that is
+//! large enough to show them extends beyond the tile. The image is compressed to a third of its
 //! width, along one of a few directions. In the direction nearest to that of the tiles, they appear
-//! as if seen at 60° or 65°.
+//! as if seen at 40° to 60°; those seen at 80°, as if at 60° to 70°.
 //!
 //! ```text
 //!     ╲▁▁▁▁▁▁╱▔▔▔▔▔▔╲▁▁▁▁▁▁╱        ╲▁▁╱▔▔╲▁▁╱
@@ -13,21 +13,25 @@
 use std::f64::consts::PI;
 
 use glam::DVec2;
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, SymmetricEigen, Vector2};
 use rayon::prelude::*;
 
 use crate::corners::saddles::{SaddleFinder, is_all_noise};
 use crate::grid::grids::grids;
 use crate::grid::saddle_grid::SaddleGrid;
 use crate::levels::MIN_LEVEL_SIDE;
+use crate::tiling::step;
 use deltille_core::raster::{Gray, Pyramid};
 
-/// Number of directions in 180°. No direction is more than 15° from one of them. At 15°, half the width changes tiles
-/// from an aspect ratio of 4 to one of 2.4.
-const DIRECTIONS: usize = 6;
+/// Number of directions in 180° if that of the tiles is unknown. No direction is more than 11° from one of them. At 11°,
+/// a third of the width changes tiles from an aspect ratio of 4 to one of 2.2.
+const DIRECTIONS: usize = 8;
 
 /// Factor of the compressed width.
-const WIDTH: f64 = 0.5;
+const WIDTH: f64 = 1.0 / 3.0;
+
+/// Aspect ratio of tiles, seen at 70°, from which a grid may lack corners that the compressed image shows.
+const LARGE_ASPECT: f64 = 3.0;
 
 /// Maximum number of pixels of the pyramid level that is used: tiles of larger images are larger.
 const MAX_PIXELS: usize = 2_500_000;
@@ -42,10 +46,32 @@ const LEVEL_STEP: f64 = 1e-9;
 /// Value outside the image, on a scale of 0 to 1023: neither dark nor bright.
 const OUTSIDE: i16 = 512;
 
+/// Returns all directions of tiles that are tried if none is known, radians.
+pub(crate) fn all_directions() -> Vec<f64> {
+    (0..DIRECTIONS).map(|i| PI * i as f64 / DIRECTIONS as f64).collect()
+}
+
+/// Returns the direction in which the tiles of a grid are long, radians, if they are foreshortened.
+pub(crate) fn foreshortened_direction<const N: usize>(grid: &SaddleGrid) -> Option<f64> {
+    // Over the steps of a lattice that is seen from the front, the outer products add up to a multiple of the identity.
+    let mut moments = Matrix2::zeros();
+    for (&vertex, placed) in grid {
+        for next in (0..N / 2).filter_map(|k| grid.get(&(vertex + step::<N>(k)))) {
+            let DVec2 { x, y } = next.position - placed.position;
+            moments += Matrix2::new(x * x, x * y, x * y, y * y);
+        }
+    }
+    let SymmetricEigen { eigenvalues, eigenvectors } = moments.symmetric_eigen();
+    let long = eigenvalues.imax();
+    let is_long = eigenvalues[long] > LARGE_ASPECT * LARGE_ASPECT * eigenvalues[1 - long];
+    is_long.then(|| eigenvectors[(1, long)].atan2(eigenvectors[(0, long)]))
+}
+
 /// Returns the grids of the direction in which the largest is seen, in px of level 0.
 pub(crate) fn foreshortened_grids<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
+    directions: &[f64],
 ) -> Vec<SaddleGrid> {
     let levels = pyramid.levels();
     let fitting = levels.iter().position(|level| level.pixels().len() <= MAX_PIXELS);
@@ -54,8 +80,8 @@ pub(crate) fn foreshortened_grids<const N: usize>(
     if is_small || is_all_noise(&levels[level]) {
         return Vec::new();
     }
-    let views = (0..DIRECTIONS).into_par_iter().map(|i| {
-        let view = View::new(&levels[level], PI * i as f64 / DIRECTIONS as f64);
+    let views = directions.par_iter().map(|&angle| {
+        let view = View::new(&levels[level], angle);
         let drawn = view.drawn(&levels[level]);
         let compressed = Pyramid::new(&drawn, levels.len() - level, MIN_LEVEL_SIDE);
         let saddles = finder.find(&compressed);
@@ -167,8 +193,8 @@ mod tests {
             let [u, v] = [x as f64 - 120.3, y as f64 - 60.8];
             (1000.0 * (-(u * u + v * v) / 200.0).exp()) as i16
         });
-        for i in 0..DIRECTIONS {
-            let view = View::new(&image, PI * i as f64 / DIRECTIONS as f64);
+        for angle in all_directions() {
+            let view = View::new(&image, angle);
             let drawn = view.drawn(&image);
             let (mut sum, mut middle) = (0.0, DVec2::ZERO);
             for y in 0..drawn.height() {

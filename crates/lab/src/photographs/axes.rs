@@ -174,9 +174,11 @@ impl Axis {
             Self::Contrast => {
                 numbers(&[1.1, 1.2, 1.5, 2.0, 4.0, 16.0, 50.0], |s, v| s.contrast = v)
             }
-            Self::Tilt => numbers(&[0.0, 15.0, 30.0, 45.0, 55.0, 65.0, 70.0, 75.0], |s, v| {
-                s.tilt_deg = Some(v);
-            }),
+            Self::Tilt => {
+                numbers(&[0.0, 15.0, 30.0, 45.0, 55.0, 65.0, 70.0, 75.0, 80.0], |s, v| {
+                    s.tilt_deg = Some(v);
+                })
+            }
             Self::Distance => {
                 numbers(&[8.0, 6.0, 4.0, 3.0, 2.0, 1.5, 1.25, 1.0], |s, v| s.bit_px = v)
             }
