@@ -1,10 +1,10 @@
-//! Joins the parts of a partly covered board through the local map of one part.
+//! Joins the parts of a partly covered board through the maps of one part.
 //!
 //! A finger over a board splits it into grids that no link joins, and single corners without a
 //! completely visible tile. The local map of a grid ([`LocalMap`]) predicts where its lattice
-//! continues behind the finger. A corner there belongs to the board if it lies at a vertex and all
-//! its edges have the predicted directions and dark sides. A grid belongs to the same board if all
-//! its corners that are near enough do.
+//! continues behind the finger, and its homography ([`PlaneMap`]) behind a hand. A corner there belongs to the board if
+//! it lies at a vertex and all its edges have the predicted directions and dark sides. A grid belongs to the same board
+//! if all its corners for which there is a prediction do.
 
 use std::collections::BTreeMap;
 
@@ -14,6 +14,7 @@ use super::effort::Effort;
 use super::links::edge::{End, MAX_CHORD_RAD, is_clean};
 use super::links::link::MAX_CONTRAST_RATIO;
 use super::map::local_map::{LocalMap, Shape};
+use super::map::plane_map::PlaneMap;
 use super::saddle_grid::{Growing, GrownSaddle};
 use crate::corners::buckets::Buckets;
 use crate::corners::saddles::Saddle;
@@ -22,9 +23,14 @@ use crate::tiling::{kind, neighbours, step};
 use deltille_core::lattice::{GridKind, LatticeMap, Vertex};
 use deltille_core::raster::Pyramid;
 
-/// Maximum distance of a vertex from the corners of a grid, in edges of the map. Farther away, the map predicts almost
-/// nothing.
+/// Maximum distance of a vertex from the corners of a grid, in edges, that the local map predicts.
 const MAX_REACH: f64 = 4.0;
+
+/// Maximum distance that the homography predicts: the other end of a large board.
+const MAX_PLANE_REACH: f64 = 16.0;
+
+/// Maximum number of corners from which the homography is fitted. More hardly reduce its error.
+const MOST_OF_PLANE: usize = 200;
 
 /// Maximum mean length of the edges beyond a grid that approaches the camera, relative to the
 /// longest edge of the grid.
@@ -70,13 +76,13 @@ pub(crate) fn join<const N: usize>(
     let mut joining = Joining { pyramid, saddles, places, grids, owners, effort };
     for base in order {
         while joining.grids[base].len() >= LEAST {
-            let shape = shape(&joining.grids[base]);
-            let candidates = joining.candidates(base, shape);
+            let maps = Maps::of(&joining.grids[base]);
+            let candidates = joining.candidates(base, &maps);
             if !joining.effort.spend(joining.grids[base].len() + candidates.len()) {
                 break;
             }
             // Nothing changes until a corner is added.
-            if !SIGMAS.into_iter().any(|sigma| joining.adopt(base, &candidates, shape, sigma)) {
+            if !SIGMAS.into_iter().any(|sigma| joining.adopt(base, &candidates, &maps, sigma)) {
                 break;
             }
             has_grown[base] = true;
@@ -104,7 +110,7 @@ impl<const N: usize> Joining<'_, N> {
         &mut self,
         base: usize,
         candidates: &[(usize, Vertex)],
-        shape: Shape,
+        maps: &Maps,
         sigma: f64,
     ) -> bool {
         let Self { pyramid, saddles, grids, owners, effort, .. } = self;
@@ -117,7 +123,10 @@ impl<const N: usize> Joining<'_, N> {
             if grids[base].contains_key(&vertex) {
                 continue;
             }
-            let Some(grown) = belongs(&grids[base], vertex, &saddles[index], shape, sigma) else {
+            let Some(map) = maps.about(&grids[base], vertex, sigma) else {
+                continue;
+            };
+            let Some(grown) = belongs(&grids[base], vertex, &saddles[index], &map) else {
                 continue;
             };
             if !is_joined(pyramid, &grids[base], vertex, &grown) {
@@ -130,7 +139,7 @@ impl<const N: usize> Joining<'_, N> {
                     let map = LatticeMap::taking(kind::<N>(), from, vertex, turned as i32);
                     let is_worth =
                         effort.spend(grids[part].len() + owners.len() / CORNERS_IN_A_LOOK);
-                    if is_worth && is_part(&grids[base], &grids[part], map, shape, sigma) {
+                    if is_worth && is_part(&grids[base], &grids[part], map, maps, sigma) {
                         for (from, corner) in std::mem::take(&mut grids[part]) {
                             let turn = (corner.turn + turned) % N;
                             grids[base].insert(map.apply(from), GrownSaddle { turn, ..corner });
@@ -142,6 +151,19 @@ impl<const N: usize> Joining<'_, N> {
                     }
                 }
                 None => {
+                    // A distant corner may belong to anything, unless an edge connects it to another one.
+                    let is_confirmed = !maps.is_distant(&grids[base], vertex)
+                        || candidates.iter().any(|&(other, beside)| {
+                            let Some(k) = (0..N).find(|&k| vertex + step::<N>(k) == beside) else {
+                                return false;
+                            };
+                            let map = maps.about(&grids[base], beside, sigma);
+                            map.and_then(|map| belongs(&grids[base], beside, &saddles[other], &map))
+                                .is_some_and(|other| is_edge(pyramid, &grown, k, &other))
+                        });
+                    if !is_confirmed {
+                        continue;
+                    }
                     grids[base].insert(vertex, grown);
                     owners.insert(index, (base, vertex));
                     adopted = true;
@@ -152,37 +174,40 @@ impl<const N: usize> Joining<'_, N> {
     }
 
     /// Returns saddle points near a vertex without a corner, each with that vertex, the nearest to the grid first.
-    fn candidates(&self, base: usize, shape: Shape) -> Vec<(usize, Vertex)> {
+    fn candidates(&self, base: usize, maps: &Maps) -> Vec<(usize, Vertex)> {
         let grid = &self.grids[base];
-        let Some((middle, reach_px)) = surroundings(grid) else {
+        let reach = if maps.plane.is_some() { MAX_PLANE_REACH } else { MAX_REACH };
+        let Some((middle, reach_px)) = surroundings(grid, reach) else {
             return Vec::new();
         };
         let corners: Vec<DVec2> = grid.values().map(|grown| grown.saddle.position).collect();
         let (vertices, corners): (Vec<Vertex>, _) =
             (grid.keys().copied().collect(), Buckets::of(&corners));
-        let mut maps: BTreeMap<Vertex, Option<LocalMap>> = BTreeMap::new();
+        let mut about: BTreeMap<Vertex, Option<LocalMap>> = BTreeMap::new();
         let mut found: Vec<(f64, usize, Vertex)> = Vec::new();
         for (index, _) in self.places.within(middle, reach_px) {
-            let saddle = &self.saddles[index];
+            let place = self.saddles[index].position;
             if self.owners.get(&index).is_some_and(|&(grid, _)| grid == base) {
                 continue;
             }
-            let Some(nearest) = corners.nearest(saddle.position).map(|index| vertices[index])
-            else {
+            let Some(nearest) = corners.nearest(place).map(|index| vertices[index]) else {
                 continue;
             };
-            let map = maps
+            let map = about
                 .entry(nearest)
-                .or_insert_with(|| LocalMap::about::<N>(nearest, at(grid), shape));
-            let Some(DVec2 { x: col, y: row }) = map.and_then(|map| map.steps_to(saddle.position))
-            else {
-                continue;
+                .or_insert_with(|| LocalMap::about::<N>(nearest, at(grid), maps.shape));
+            let near = map.and_then(|map| map.steps_to(place)).and_then(|way| {
+                let step = Vertex::new(way.y.round() as i32, way.x.round() as i32);
+                let far = kind::<N>().position(way.y, way.x).length();
+                (far <= MAX_REACH).then_some((far, nearest + step))
+            });
+            let distant = || {
+                let vertex = maps.plane.as_ref()?.nearest(place)?;
+                Some((steps_between::<N>(nearest, vertex), vertex))
             };
-            let way = kind::<N>().position(row, col);
-            let step = Vertex::new(row.round() as i32, col.round() as i32);
-            let vertex = nearest + step;
-            if way.x.hypot(way.y) <= MAX_REACH && !grid.contains_key(&vertex) {
-                found.push((way.x.hypot(way.y), index, vertex));
+            let Some((far, vertex)) = near.or_else(distant) else { continue };
+            if far <= reach && !grid.contains_key(&vertex) {
+                found.push((far, index, vertex));
             }
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -190,17 +215,55 @@ impl<const N: usize> Joining<'_, N> {
     }
 }
 
+/// Maps of a grid that predict its other corners.
+struct Maps {
+    shape: Shape,
+    plane: Option<PlaneMap>,
+}
+
+impl Maps {
+    fn of<const N: usize>(grid: &Growing<N>) -> Self {
+        let level = grid.values().map(|grown| grown.saddle.level).max().unwrap_or(0);
+        let shape = Shape::of::<N>(grid.keys().copied(), at(grid), level);
+        let every = grid.len().div_ceil(MOST_OF_PLANE).max(1);
+        let corners = grid.iter().step_by(every);
+        let corners: Vec<_> = corners.map(|(&v, grown)| (v, grown.saddle.position)).collect();
+        Self { shape, plane: PlaneMap::of(&corners, shape) }
+    }
+
+    /// Returns the map about a vertex whose standard deviation is at most `sigma` edges.
+    fn about<const N: usize>(
+        &self,
+        grid: &Growing<N>,
+        vertex: Vertex,
+        sigma: f64,
+    ) -> Option<LocalMap> {
+        let is_known = |map: &LocalMap| map.sigma <= sigma;
+        let local = LocalMap::about::<N>(vertex, at(grid), self.shape).filter(is_known);
+        local.or_else(|| self.plane.as_ref()?.about(vertex).filter(is_known))
+    }
+
+    /// Returns whether only the homography predicts a vertex, and the grid has none of its neighbours.
+    fn is_distant<const N: usize>(&self, grid: &Growing<N>, vertex: Vertex) -> bool {
+        let is_alone = !neighbours::<N>(vertex).iter().any(|v| grid.contains_key(v));
+        let largest = SIGMAS[SIGMAS.len() - 1];
+        let local = || LocalMap::about::<N>(vertex, at(grid), self.shape);
+        is_alone && local().is_none_or(|map| map.sigma > largest)
+    }
+}
+
+/// Returns the distance between two vertices on the print, in edges of equal spacing.
+fn steps_between<const N: usize>(from: Vertex, to: Vertex) -> f64 {
+    let step = to - from;
+    kind::<N>().position(step.row.into(), step.col.into()).length()
+}
+
 fn at<const N: usize>(grid: &Growing<N>) -> impl Fn(Vertex) -> Option<DVec2> + Copy {
     |v| grid.get(&v).map(|grown| grown.saddle.position)
 }
 
-fn shape<const N: usize>(grid: &Growing<N>) -> Shape {
-    let level = grid.values().map(|grown| grown.saddle.level).max().unwrap_or(0);
-    Shape::of::<N>(grid.keys().copied(), at(grid), level)
-}
-
-/// Returns a circle (centre and radius, px) around all positions that a grid predicts.
-fn surroundings<const N: usize>(grid: &Growing<N>) -> Option<(DVec2, f64)> {
+/// Returns a circle (centre and radius, px) around all positions within `reach` edges of a grid.
+fn surroundings<const N: usize>(grid: &Growing<N>, reach: f64) -> Option<(DVec2, f64)> {
     let places: Vec<DVec2> = grid.values().map(|grown| grown.saddle.position).collect();
     let edges_px = grid.iter().flat_map(|(&v, grown)| {
         let neighbours = neighbours::<N>(v).into_iter().filter_map(at(grid));
@@ -209,7 +272,7 @@ fn surroundings<const N: usize>(grid: &Growing<N>) -> Option<(DVec2, f64)> {
     let longest_px = edges_px.reduce(f64::max)?;
     let lower = places.iter().copied().reduce(DVec2::min)?;
     let upper = places.iter().copied().reduce(DVec2::max)?;
-    let reach_px = lower.distance(upper) / 2.0 + NEARER * MAX_REACH * longest_px;
+    let reach_px = lower.distance(upper) / 2.0 + NEARER * reach * longest_px;
     Some((lower.midpoint(upper), reach_px))
 }
 
@@ -218,10 +281,8 @@ fn belongs<const N: usize>(
     grid: &Growing<N>,
     vertex: Vertex,
     saddle: &Saddle<N>,
-    shape: Shape,
-    sigma: f64,
+    map: &LocalMap,
 ) -> Option<GrownSaddle<N>> {
-    let map = LocalMap::about::<N>(vertex, at(grid), shape).filter(|map| map.sigma <= sigma)?;
     if map.distance::<N>(saddle.position)? > MAX_SIGMAS * map.sigma {
         return None;
     }
@@ -257,24 +318,26 @@ fn is_joined<const N: usize>(
         let Some(other) = grid.get(&(vertex + step::<N>(k))) else {
             continue;
         };
-        let (ray, back) = (corner.ray(k), other.ray(k + N / 2));
         beside += 1;
-        clean += usize::from(is_clean(
-            pyramid,
-            End::of(&corner.saddle, ray),
-            End::of(&other.saddle, back),
-        ));
+        clean += usize::from(is_edge(pyramid, corner, k, other));
     }
     MAX_COVERED * clean >= beside
 }
 
+/// Returns whether an edge is visible from a corner to its neighbour along step `k` of the lattice.
+fn is_edge<const N: usize>(
+    pyramid: &Pyramid,
+    corner: &GrownSaddle<N>,
+    k: usize,
+    other: &GrownSaddle<N>,
+) -> bool {
+    let (ray, back) = (corner.ray(k), other.ray(k + N / 2));
+    is_clean(pyramid, End::of(&corner.saddle, ray), End::of(&other.saddle, back))
+}
+
 /// Returns the contrast of the corner of a grid that is nearest to a vertex on the lattice.
 fn contrast_near<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<f64> {
-    let far = |v: &Vertex| {
-        let step = *v - vertex;
-        let way = kind::<N>().position(step.row.into(), step.col.into());
-        way.x.hypot(way.y)
-    };
+    let far = |v: &Vertex| steps_between::<N>(vertex, *v);
     let nearest = grid.iter().min_by(|a, b| far(a.0).total_cmp(&far(b.0)))?;
     Some(nearest.1.saddle.sectors.amplitude)
 }
@@ -285,7 +348,7 @@ fn is_part<const N: usize>(
     grid: &Growing<N>,
     part: &Growing<N>,
     map: LatticeMap,
-    shape: Shape,
+    maps: &Maps,
     sigma: f64,
 ) -> bool {
     part.iter().all(|(&from, corner)| {
@@ -293,9 +356,7 @@ fn is_part<const N: usize>(
         if grid.contains_key(&vertex) {
             return false;
         }
-        let predicted =
-            LocalMap::about::<N>(vertex, at(grid), shape).filter(|map| map.sigma <= sigma);
-        predicted.is_none_or(|map| {
+        maps.about(grid, vertex, sigma).is_none_or(|map| {
             let distance = map.distance::<N>(corner.saddle.position);
             distance.is_some_and(|distance| distance <= MAX_SIGMAS * map.sigma)
         })

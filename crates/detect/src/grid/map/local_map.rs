@@ -100,6 +100,11 @@ impl Shape {
         let place_px = PLACE_PX * f64::from(1u32 << level);
         Self { spacing, second: (sum / count).sqrt(), place_px }
     }
+
+    /// Returns the standard deviation of a corner, px.
+    pub(super) fn place_px(self) -> f64 {
+        self.place_px
+    }
 }
 
 /// The map about a vertex.
@@ -117,6 +122,17 @@ pub(crate) struct LocalMap {
 }
 
 impl LocalMap {
+    /// Creates a map from a position, its derivatives, px per mean step, and its standard deviation in edges.
+    pub(super) fn new(
+        place: DVec2,
+        jacobian: [DVec2; 2],
+        vertex: Vertex,
+        spacing: Spacing,
+        sigma: f64,
+    ) -> Self {
+        Self { place, jacobian, vertex, spacing, sigma }
+    }
+
     /// Returns the map about `vertex` of corners with N rays, whose positions `at` returns; `None` if they are
     /// collinear.
     pub(crate) fn about<const N: usize>(
