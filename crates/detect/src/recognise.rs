@@ -187,7 +187,7 @@ impl Recogniser {
                 let reader = TagReader::new(&families[0].family, place);
                 for (grid, inverted) in found.iter().flat_map(|grid| [(grid, false), (grid, true)])
                 {
-                    let read = reader.read(image, grid, inverted, MAX_TILES);
+                    let read = reader.read(image, grid, &SaddleGrid::new(), inverted, MAX_TILES);
                     all.extend(families.iter().filter_map(|known| {
                         let (tags, evidence) = same_orientation(&read, known, &reader)?;
                         let family = &known.family;

@@ -2,7 +2,7 @@
 //!
 //! A finger over a board splits it into grids that no link joins, and single corners without a
 //! completely visible tile. The local map of a grid ([`LocalMap`]) predicts where its lattice
-//! continues behind the finger, and its homography ([`PlaneMap`]) behind a hand. A corner there belongs to the board if
+//! continues behind the finger, and its homography ([`PlaneMap`](super::map::plane_map::PlaneMap)) behind a hand. A corner there belongs to the board if
 //! it lies at a vertex and all its edges have the predicted directions and dark sides. A grid belongs to the same board
 //! if all its corners for which there is a prediction do.
 
@@ -14,7 +14,7 @@ use super::effort::Effort;
 use super::links::edge::{End, MAX_CHORD_RAD, is_clean};
 use super::links::link::MAX_CONTRAST_RATIO;
 use super::map::local_map::{LocalMap, Shape};
-use super::map::plane_map::PlaneMap;
+use super::map::maps::Maps;
 use super::saddle_grid::{Growing, GrownSaddle};
 use crate::corners::buckets::Buckets;
 use crate::corners::saddles::Saddle;
@@ -28,9 +28,6 @@ const MAX_REACH: f64 = 4.0;
 
 /// Maximum distance that the homography predicts: the other end of a large board.
 const MAX_PLANE_REACH: f64 = 16.0;
-
-/// Maximum number of corners from which the homography is fitted. More hardly reduce its error.
-const MOST_OF_PLANE: usize = 200;
 
 /// Maximum mean length of the edges beyond a grid that approaches the camera, relative to the
 /// longest edge of the grid.
@@ -76,7 +73,7 @@ pub(crate) fn join<const N: usize>(
     let mut joining = Joining { pyramid, saddles, places, grids, owners, effort };
     for base in order {
         while joining.grids[base].len() >= LEAST {
-            let maps = Maps::of(&joining.grids[base]);
+            let maps = maps(&joining.grids[base]);
             let candidates = joining.candidates(base, &maps);
             if !joining.effort.spend(joining.grids[base].len() + candidates.len()) {
                 break;
@@ -123,7 +120,7 @@ impl<const N: usize> Joining<'_, N> {
             if grids[base].contains_key(&vertex) {
                 continue;
             }
-            let Some(map) = maps.about(&grids[base], vertex, sigma) else {
+            let Some(map) = maps.about::<N>(vertex, at(&grids[base]), sigma) else {
                 continue;
             };
             let Some(grown) = belongs(&grids[base], vertex, &saddles[index], &map) else {
@@ -152,12 +149,12 @@ impl<const N: usize> Joining<'_, N> {
                 }
                 None => {
                     // A distant corner may belong to anything, unless an edge connects it to another one.
-                    let is_confirmed = !maps.is_distant(&grids[base], vertex)
+                    let is_confirmed = !is_distant(&grids[base], vertex, maps.shape)
                         || candidates.iter().any(|&(other, beside)| {
                             let Some(k) = (0..N).find(|&k| vertex + step::<N>(k) == beside) else {
                                 return false;
                             };
-                            let map = maps.about(&grids[base], beside, sigma);
+                            let map = maps.about::<N>(beside, at(&grids[base]), sigma);
                             map.and_then(|map| belongs(&grids[base], beside, &saddles[other], &map))
                                 .is_some_and(|other| is_edge(pyramid, &grown, k, &other))
                         });
@@ -215,41 +212,17 @@ impl<const N: usize> Joining<'_, N> {
     }
 }
 
-/// Maps of a grid that predict its other corners.
-struct Maps {
-    shape: Shape,
-    plane: Option<PlaneMap>,
+fn maps<const N: usize>(grid: &Growing<N>) -> Maps {
+    let level = grid.values().map(|grown| grown.saddle.level).max().unwrap_or(0);
+    Maps::of::<N>(grid.keys().copied(), at(grid), level)
 }
 
-impl Maps {
-    fn of<const N: usize>(grid: &Growing<N>) -> Self {
-        let level = grid.values().map(|grown| grown.saddle.level).max().unwrap_or(0);
-        let shape = Shape::of::<N>(grid.keys().copied(), at(grid), level);
-        let every = grid.len().div_ceil(MOST_OF_PLANE).max(1);
-        let corners = grid.iter().step_by(every);
-        let corners: Vec<_> = corners.map(|(&v, grown)| (v, grown.saddle.position)).collect();
-        Self { shape, plane: PlaneMap::of(&corners, shape) }
-    }
-
-    /// Returns the map about a vertex whose standard deviation is at most `sigma` edges.
-    fn about<const N: usize>(
-        &self,
-        grid: &Growing<N>,
-        vertex: Vertex,
-        sigma: f64,
-    ) -> Option<LocalMap> {
-        let is_known = |map: &LocalMap| map.sigma <= sigma;
-        let local = LocalMap::about::<N>(vertex, at(grid), self.shape).filter(is_known);
-        local.or_else(|| self.plane.as_ref()?.about(vertex).filter(is_known))
-    }
-
-    /// Returns whether only the homography predicts a vertex, and the grid has none of its neighbours.
-    fn is_distant<const N: usize>(&self, grid: &Growing<N>, vertex: Vertex) -> bool {
-        let is_alone = !neighbours::<N>(vertex).iter().any(|v| grid.contains_key(v));
-        let largest = SIGMAS[SIGMAS.len() - 1];
-        let local = || LocalMap::about::<N>(vertex, at(grid), self.shape);
-        is_alone && local().is_none_or(|map| map.sigma > largest)
-    }
+/// Returns whether only the homography predicts a vertex, and the grid has none of its neighbours.
+fn is_distant<const N: usize>(grid: &Growing<N>, vertex: Vertex, shape: Shape) -> bool {
+    let is_alone = !neighbours::<N>(vertex).iter().any(|v| grid.contains_key(v));
+    let largest = SIGMAS[SIGMAS.len() - 1];
+    let local = || LocalMap::about::<N>(vertex, at(grid), shape);
+    is_alone && local().is_none_or(|map| map.sigma > largest)
 }
 
 /// Returns the distance between two vertices on the print, in edges of equal spacing.
@@ -356,7 +329,7 @@ fn is_part<const N: usize>(
         if grid.contains_key(&vertex) {
             return false;
         }
-        maps.about(grid, vertex, sigma).is_none_or(|map| {
+        maps.about::<N>(vertex, at(grid), sigma).is_none_or(|map| {
             let distance = map.distance::<N>(corner.saddle.position);
             distance.is_some_and(|distance| distance <= MAX_SIGMAS * map.sigma)
         })

@@ -228,7 +228,7 @@ impl GridLight {
         0.5 + 0.5 * s
     }
 
-    /// Returns black and white over a tile whose corners are in the grid.
+    /// Returns black and white over a tile, from the edges whose corners are in the grid.
     pub(crate) fn levels(
         &self,
         image: ImageView,
@@ -256,6 +256,9 @@ impl GridLight {
         let mut right = [Vector3::zeros(); 2];
         for i in 0..vertices.len() {
             let (from, to) = (vertices[i], vertices[(i + 1) % vertices.len()]);
+            if !grid.contains_key(&from) || !grid.contains_key(&to) {
+                continue;
+            }
             let steps = self.kind.steps();
             let k = steps.iter().position(|&step| step == to - from)?;
             let half = steps.len() / 2;

@@ -73,7 +73,7 @@ impl SettingsFinder {
         let own = Target::build("own", &self.spec, Some(&self.family)).ok()?;
         let panel = own.panels.first()?;
         let reader = TagReader::new(&self.family, TagPlace::of(panel));
-        let read = reader.read(image, grid, panel.inverted, MAX_TILES);
+        let read = reader.read(image, grid, &SaddleGrid::new(), panel.inverted, MAX_TILES);
         let families = self.families.get_or_init(|| Arc::new(self.families_alike()));
         let mut found: Vec<(usize, TargetSpec, &Family)> = Vec::new();
         for (family, decoder) in families.iter() {

@@ -1,5 +1,6 @@
 //! Reads the tags in tiles: the odds that each cell is white.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use glam::DVec2;
@@ -49,6 +50,8 @@ pub(crate) struct Reading {
     pub tile: Tile,
     /// Half the log-odds that a cell has the colour around the border, by bit in the coordinates of [`Tile::frame`].
     pub half_odds: Vec<f32>,
+    /// Whether a corner of the tile is hidden, so that it may lie beyond the panel.
+    pub has_hidden: bool,
 }
 
 impl Reading {
@@ -154,12 +157,13 @@ impl TagReader {
         }
     }
 
-    /// Reads tiles of a grid whose corners are known. Reads only tiles that may carry a tag, on an
-    /// inverted or a normal board. At most `most` tiles are read, spread over the grid.
+    /// Reads tiles of a grid whose corners are known, or predicted if they are `hidden`. Reads only tiles that may carry
+    /// a tag, on an inverted or a normal board. At most `most` tiles are read, spread over the grid.
     pub(crate) fn read(
         &self,
         image: ImageView,
         grid: &SaddleGrid,
+        hidden: &SaddleGrid,
         inverted: bool,
         most: usize,
     ) -> Read {
@@ -169,18 +173,26 @@ impl TagReader {
             return Read::default();
         };
         let dark = (self.tags_in == TagsIn::Black) != inverted;
-        let tiles: Vec<Tile> = grid
+        let mut placed = Cow::Borrowed(grid);
+        if !hidden.is_empty() {
+            placed.to_mut().extend(hidden);
+        }
+        let tiles: Vec<Tile> = placed
             .keys()
             .flat_map(|&v| self.kind.tiles_from(v))
             .filter(|tile| tile.is_dark() == dark)
-            .filter(|tile| tile.vertices().all(|v| grid.contains_key(&v)))
+            .filter(|tile| tile.vertices().all(|v| placed.contains_key(&v)))
+            .filter(|tile| tile.vertices().any(|v| grid.contains_key(&v)))
             .collect();
         let every = tiles.len().div_ceil(most.max(1)).max(1);
         let mut known = Known::default();
         let mut bits_px = Vec::new();
         let mut readings = Vec::new();
         for &tile in tiles.iter().step_by(every) {
-            if let Some((reading, bit_px)) = self.read_tile(image, grid, tile, &light, &mut known) {
+            let map = TileMap::new(&placed, tile, self.gap_edges);
+            let read =
+                map.and_then(|map| self.read_tile(image, grid, tile, &map, &light, &mut known));
+            if let Some((reading, bit_px)) = read {
                 readings.push(reading);
                 bits_px.push(bit_px);
             }
@@ -203,6 +215,7 @@ impl TagReader {
         Reading {
             tile: Tile { anchor: Vertex::new(tile.anchor.col, tile.anchor.row), ..tile },
             half_odds: self.mirror.iter().map(|&bit| reading.half_odds[usize::from(bit)]).collect(),
+            has_hidden: reading.has_hidden,
         }
     }
 
@@ -211,10 +224,10 @@ impl TagReader {
         image: ImageView,
         grid: &SaddleGrid,
         tile: Tile,
+        map: &TileMap,
         light: &GridLight,
         known: &mut Known,
     ) -> Option<(Reading, f64)> {
-        let map = TileMap::new(grid, tile, self.gap_edges)?;
         let levels = light.levels(image, grid, tile, &mut known.edges)?;
         let middle = self.kind.middle();
         let [_, contrast] = levels.at(middle);
@@ -274,7 +287,9 @@ impl TagReader {
             }
         }
         let length = |step: DVec2| step.x.hypot(step.y);
-        Some((Reading { tile, half_odds }, length(along[0]).max(length(along[1]))))
+        let has_hidden = !tile.vertices().all(|v| grid.contains_key(&v));
+        let bit_px = length(along[0]).max(length(along[1]));
+        Some((Reading { tile, half_odds, has_hidden }, bit_px))
     }
 }
 

@@ -6,10 +6,12 @@ use super::labeller::{Budget, LabelPanel, LabelTag, Labelled, TagEvidence, TagLa
 use super::likelihood::{PROPOSING, Placement};
 use super::motion::panel_from_grid;
 use super::sight::Sight;
+use crate::grid::gaps::hidden::hidden_corners;
 use crate::grid::saddle_grid::{SaddleGrid, mirrored};
 use crate::labels::tags::{Read, Reading};
+use crate::tiling::{CHECKER, DELTILLE};
 use deltille_core::detection::DecodedTag;
-use deltille_core::lattice::{LatticeMap, Vertex};
+use deltille_core::lattice::{GridKind, LatticeMap, Vertex};
 use deltille_core::raster::ImageView;
 
 /// Minimum evidence after correction for the number of placements, nats: 6 bits, so that fewer than one in 64 images
@@ -45,12 +47,34 @@ struct Placed {
 }
 
 impl TagLabeller {
-    /// Identifies the panels in a grid by its tags. Positions are px of `image`. `budget` is reduced by the cost; once
-    /// it is exhausted, no more tiles are read.
+    /// Identifies the panels in a grid by its tags. Positions are px of `image`. Tiles with hidden corners are read only
+    /// if the others do not suffice. `budget` is reduced by the cost; once it is exhausted, no more tiles are read.
     pub(crate) fn label(
         &self,
         image: ImageView,
         grid: &SaddleGrid,
+        budget: &mut Budget,
+    ) -> TagEvidence {
+        let evidence = self.label_with(image, grid, &SaddleGrid::new(), budget);
+        if !evidence.found.is_empty() || evidence.contradicted.is_some() {
+            return evidence;
+        }
+        let hidden = match self.kind {
+            GridKind::Deltille => hidden_corners::<DELTILLE>(grid),
+            GridKind::Checker => hidden_corners::<CHECKER>(grid),
+        };
+        if hidden.is_empty() {
+            return evidence;
+        }
+        let with_hidden = self.label_with(image, grid, &hidden, budget);
+        if with_hidden.found.is_empty() { evidence } else { with_hidden }
+    }
+
+    fn label_with(
+        &self,
+        image: ImageView,
+        grid: &SaddleGrid,
+        hidden: &SaddleGrid,
         budget: &mut Budget,
     ) -> TagEvidence {
         let mut evidence = TagEvidence::default();
@@ -62,7 +86,7 @@ impl TagLabeller {
                 evidence.is_cut_short = true;
                 return evidence;
             }
-            let read = self.readers[way.reader].read(image, grid, way.inverted, most);
+            let read = self.readers[way.reader].read(image, grid, hidden, way.inverted, most);
             let Read { readings, bit_px, blur_px } = read;
             budget.0 -= readings.len() * cost;
             evidence.tiles += readings.len();

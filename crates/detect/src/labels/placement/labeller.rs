@@ -87,6 +87,8 @@ pub(crate) struct TagLabeller {
     pub(super) max_errors: Option<u32>,
     /// Words of the target.
     pub(super) words: TargetWords,
+    /// Tiling of the tags.
+    pub(super) kind: GridKind,
     /// Properties of each panel of the target, in order.
     pub(super) panels: Vec<LabelPanel>,
     /// Whether several panels may lie in one grid, like the faces of a solid.
@@ -189,6 +191,7 @@ impl TagLabeller {
         let readers = tag_places.iter().map(|&place| TagReader::new(family, place)).collect();
         (!ids.is_empty()).then(|| Self {
             readers,
+            kind: family.kind(),
             family: family.name().to_owned(),
             is_dense: family.is_position_family(),
             decoder: (!family.is_position_family()).then(decoder),

@@ -125,7 +125,7 @@ impl TagLabeller {
             let predicted = shown.if_plain;
             let of_board = Some(shown.of_board[0]);
             Some(Judged { predicted, other_code: predicted, of_board })
-        } else if self.panels_abut {
+        } else if self.panels_abut || sight.readings[index].has_hidden {
             None
         } else {
             let predicted = [SPOILT.ln(); DIRTY.len()];

@@ -44,7 +44,7 @@ fn found_by(labeller: &TagLabeller, family: &Family, shown: &Target, flopped: bo
         let code = codes.get(&tile).copied().unwrap_or(0);
         let odds = |bit: u32| if code >> bit & 1 == 1 { SURE } else { -SURE };
         let half_odds = (0..family.dimension().bits()).map(odds).collect();
-        let upright = Reading { tile, half_odds };
+        let upright = Reading { tile, half_odds, has_hidden: false };
         if flopped { reader.mirrored(&upright) } else { upright }
     };
     let whole = |reading: &Reading| reading.tile.vertices().all(|v| grid.contains_key(&v));
@@ -212,7 +212,7 @@ fn one_tag_labels_where_nothing_contradicts_it() {
     let tag = &panel.tags[panel.tags.len() / 2];
     let of_code = |tile: Tile, code: u64, sure: f32| {
         let odds = |bit: u32| if code >> bit & 1 == 1 { sure } else { -sure };
-        Reading { tile, half_odds: (0..25).map(odds).collect() }
+        Reading { tile, half_odds: (0..25).map(odds).collect(), has_hidden: false }
     };
     let tile = panel.tag_tile(tag);
     let beside = Tile { anchor: tile.anchor + Vertex::new(0, 1), ..tile };
@@ -257,7 +257,11 @@ fn one_natural_looking_tag_gives_no_labels() {
         let reading = |&id: &usize| {
             let odds = |bit: u32| if codes[id] >> bit & 1 == 1 { SURE } else { -SURE };
             let tag = panel.tags.iter().find(|tag| tag.id as usize == id).unwrap();
-            Reading { tile: panel.tag_tile(tag), half_odds: (0..36).map(odds).collect() }
+            Reading {
+                tile: panel.tag_tile(tag),
+                half_odds: (0..36).map(odds).collect(),
+                has_hidden: false,
+            }
         };
         let readings: Vec<Reading> = shown.iter().map(reading).collect();
         let vertices = readings.iter().flat_map(|reading| reading.tile.vertices());
@@ -312,7 +316,11 @@ fn patches_of_dense_boards_tell_their_place() {
                     let odds = (cell + NOISE * noise) / (NOISE * NOISE);
                     odds.clamp(-2.6, 2.6) as f32
                 };
-                let reading = Reading { tile: on_grid, half_odds: (0..9).map(odds).collect() };
+                let reading = Reading {
+                    tile: on_grid,
+                    half_odds: (0..9).map(odds).collect(),
+                    has_hidden: false,
+                };
                 if flopped { labeller.readers[0].mirrored(&reading) } else { reading }
             })
             .collect();
@@ -409,7 +417,9 @@ fn noisy_tags(noise: f64, views: u64, words_a_view: usize) -> NoisyTags {
                 (Vertex::new(corner.row, corner.col), placed)
             })
             .collect();
-        let readings = labeller.readers[0].read((&image).into(), &grid, false, MAX_TILES).readings;
+        let readings = labeller.readers[0]
+            .read((&image).into(), &grid, &SaddleGrid::new(), false, MAX_TILES)
+            .readings;
         let Some(at) = readings.iter().position(|r| r.tile == tile) else {
             continue;
         };
@@ -497,7 +507,7 @@ fn boards_of_random_words_get_no_labels() {
             let readings = tiles
                 .map(|tile| {
                     let odds = |_| if rng.random() { strength } else { -strength };
-                    Reading { tile, half_odds: (0..bits).map(odds).collect() }
+                    Reading { tile, half_odds: (0..bits).map(odds).collect(), has_hidden: false }
                 })
                 .collect();
             let mut evidence = TagEvidence::default();
