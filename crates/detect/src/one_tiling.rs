@@ -7,8 +7,9 @@ use super::config::DetectorConfig;
 use super::nothing_seen::nothing_found;
 use super::tiling::{CHECKER, DELTILLE, kind, step};
 use crate::corners::ring;
-use crate::corners::saddles::{SaddleFinder, too_many};
+use crate::corners::saddles::{Saddle, SaddleFinder, too_many};
 use crate::grid::grids::grids;
+use crate::grid::links::link::has_chain;
 use crate::grid::saddle_grid::SaddleGrid;
 use crate::grid::untagged::beyond::go_on;
 use crate::grid::untagged::tile_shape::{LARGE_INK, is_of_squares};
@@ -281,14 +282,16 @@ impl OneTiling {
         let mut grids = self.plausible::<N>(frame, &found, &mut left_out);
         let of_found = left_out.len();
         timing.lap("labels");
-        if self.labels.are_wanted() && self.may_lack_corners(&grids) {
+        let may_show_board = self.labels.are_wanted()
+            && (!grids.is_empty() || self.may_show_board(pyramid, &saddles));
+        if may_show_board && self.may_lack_corners(&grids) {
             let found = enlarged_grids(finder, image, pyramid, self.labels.whole());
             let found = self.plausible::<N>(frame, &found, &mut Vec::new());
             grids = with_larger_panels(grids, found);
             timing.lap("enlarged");
         }
         let directions = self.foreshortened_directions::<N>(&found, &grids);
-        if !directions.is_empty() {
+        if may_show_board && !directions.is_empty() {
             let foreshortened = foreshortened_grids(finder, pyramid, &directions);
             // Foreshortened patterns of all kinds contain triangles and squares too.
             let left_out = if grids.is_empty() { &mut left_out } else { &mut Vec::new() };
@@ -334,6 +337,13 @@ impl OneTiling {
         }
     }
 
+    /// Returns whether an image without a grid may show a part of the target, as far as corners without a tag beside them
+    /// tell: however small or foreshortened it is, some of them are found and joined.
+    fn may_show_board<const N: usize>(&self, pyramid: &Pyramid, saddles: &[Saddle<N>]) -> bool {
+        !self.tag_areas.leave_corners_clear()
+            || !too_many(pyramid, saddles.len()) && has_chain(pyramid, saddles)
+    }
+
     /// Returns the directions in which tiles may be seen that are missing because they are foreshortened, radians: that of
     /// the largest grid if it is foreshortened and not whole, and all if there is no grid.
     fn foreshortened_directions<const N: usize>(
@@ -344,7 +354,7 @@ impl OneTiling {
         let whole = self.labels.whole().map_or(usize::MAX, |whole| whole.corners());
         let is_whole = |(grid, _): &(Grid, _)| is_labelled(grid) && grid.corners.len() >= whole;
         match found.first() {
-            _ if !self.labels.are_wanted() || grids.iter().any(is_whole) => Vec::new(),
+            _ if grids.iter().any(is_whole) => Vec::new(),
             Some(largest) if !grids.is_empty() => {
                 foreshortened_direction::<N>(largest).into_iter().collect()
             }

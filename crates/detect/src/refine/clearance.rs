@@ -50,6 +50,8 @@ struct Insets {
 struct TagsOfPanel {
     tiles: BTreeSet<Tile>,
     insets: Insets,
+    /// Whether most corners have no tag beside them.
+    leave_corners_clear: bool,
 }
 
 /// The tiles of targets with tags, and the area of the tag in its tile.
@@ -70,8 +72,12 @@ impl TagAreas {
                 TagsIn::Black => cells,
                 TagsIn::White => panel.tag_margin_bits() / width,
             };
-            let tiles = panel.tags.iter().map(|tag| panel.tag_tile(tag)).collect();
-            (panel.id, TagsOfPanel { tiles, insets: Insets { tag, cells } })
+            let tiles: BTreeSet<Tile> = panel.tags.iter().map(|tag| panel.tag_tile(tag)).collect();
+            let beside: BTreeSet<Vertex> = tiles.iter().flat_map(|tile| tile.vertices()).collect();
+            let clear =
+                panel.corners.iter().filter(|c| !beside.contains(&Vertex::new(c.row, c.col)));
+            let leave_corners_clear = 2 * clear.count() > panel.corners.len();
+            (panel.id, TagsOfPanel { tiles, insets: Insets { tag, cells }, leave_corners_clear })
         };
         Self { targets: vec![(None, tagged.map(tags).collect())] }
     }
@@ -88,6 +94,12 @@ impl TagAreas {
     /// Returns whether no tile shows a tag.
     pub(crate) fn is_empty(&self) -> bool {
         self.targets.iter().all(|(_, panels)| panels.is_empty())
+    }
+
+    /// Returns whether most corners of every tagged panel have no tag beside them.
+    pub(crate) fn leave_corners_clear(&self) -> bool {
+        let mut panels = self.targets.iter().flat_map(|(_, panels)| panels.values());
+        panels.all(|panel| panel.leave_corners_clear)
     }
 
     /// Returns the area of the tag that a tile of a grid may show: as on its panel, or in any suitable tile the largest
