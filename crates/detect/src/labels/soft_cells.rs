@@ -15,14 +15,16 @@
 //! The shares depend only on the blur in tile coordinates, which neighbouring tiles share. So K is computed once, and
 //! each tile costs one multiplication.
 //!
-//! Limitations: cells are treated as independent, although wide blur correlates their errors.
+//! Limitations: cells are treated as independent, although wide blur correlates their errors; see `joint_cells`.
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
+use std::sync::OnceLock;
 
 use glam::DVec2;
 use nalgebra::{DMatrix, Matrix2};
 
+use super::joint_cells::{JointModel, JointOdds, RandomWords};
 use crate::refine::blurred_corner::erf_sqrt_half;
 use deltille_core::lattice::{GridKind, TagCells};
 
@@ -96,6 +98,8 @@ pub(crate) struct CellModel {
     points: Vec<DVec2>,
     /// Parts of the cells: bit, and centre in tile coordinates.
     parts: Vec<(usize, DVec2)>,
+    /// Words with which those of blurred tags are compared.
+    random: OnceLock<RandomWords>,
 }
 
 /// Blur in tile coordinates, and noise.
@@ -123,6 +127,8 @@ pub(crate) struct Mixing {
     inverse_variance: Vec<f32>,
     /// Standard deviation of each predicted sample if nothing is known about the cells.
     spread: Vec<f32>,
+    /// Joint likelihood of the cells, if they are not known one by one.
+    joint: Option<Rc<JointModel>>,
 }
 
 /// Cache of mixings, by quantised blur.
@@ -161,7 +167,12 @@ impl CellModel {
             margin_bits,
             points: points.collect(),
             parts: parts.collect(),
+            random: OnceLock::new(),
         }
+    }
+
+    fn random(&self) -> &RandomWords {
+        self.random.get_or_init(|| RandomWords::new(self.bits))
     }
 
     /// Returns the sample positions of a tile, in tile coordinates.
@@ -178,6 +189,20 @@ impl CellModel {
     /// Returns the edge length of the tile, bit-widths.
     pub(crate) fn width(&self) -> f64 {
         self.width
+    }
+
+    /// Returns the joint odds of the words of a tile, if its cells are not known one by one and all samples are measured.
+    pub(crate) fn joint_odds(&self, mixing: &Mixing, samples: &[Sample]) -> Option<JointOdds> {
+        let joint = mixing.joint.as_ref()?;
+        let off_middle: Option<Vec<f32>> = samples
+            .iter()
+            .zip(&mixing.middle)
+            .map(|(sample, middle)| match sample {
+                Sample::Share(share) => Some(share - middle),
+                Sample::AtLeast(_) | Sample::Erased => None,
+            })
+            .collect();
+        Some(joint.odds(&off_middle?, self.random()))
     }
 
     /// Returns the mixing for a blur, from the cache `known` if it contains nearly the same blur. Returns `None` if the
@@ -236,6 +261,9 @@ impl CellModel {
         let samples_px2 = n as f64 / (bits as f64 * self.cell_area() * area_px2);
         let variance = NOISE_WEIGHT * noise * noise * (SAMPLE_PX2 * samples_px2).max(1.0)
             + MODEL_ERROR * MODEL_ERROR * samples_px2.max(1.0);
+        let [half_shares, levels] =
+            [design.columns(0, bits), design.columns(bits, LEVELS)].map(|part| part.clone_owned());
+        let joint = JointModel::new(&half_shares, &levels, variance, self.random());
         let mut normal = design.tr_mul(&design) / variance;
         for i in 0..bits + LEVELS {
             normal[(i, i)] += 1.0;
@@ -257,6 +285,7 @@ impl CellModel {
             half_shares,
             inverse_variance: (0..bits).map(inverse_variance).collect(),
             spread,
+            joint: joint.map(Rc::new),
         })
     }
 

@@ -76,6 +76,11 @@ impl TargetWords {
         self.ids.binary_search(&id).ok()
     }
 
+    /// Returns all words.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = u64> {
+        self.words.iter().copied()
+    }
+
     /// Returns a word.
     pub(crate) fn word(&self, index: usize) -> u64 {
         self.words[index]

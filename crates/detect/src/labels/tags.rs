@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 
 use super::grid_light::{ClearDepth, GridLight};
+use super::joint_cells::JointOdds;
 use super::soft_cells::{CellModel, Mixings, Sample, TileBlur, in_tile};
 use super::tile_map::TileMap;
 use crate::grid::saddle_grid::SaddleGrid;
@@ -52,6 +53,8 @@ pub(crate) struct Reading {
     pub half_odds: Vec<f32>,
     /// Whether a corner of the tile is hidden, so that it may lie beyond the panel.
     pub has_hidden: bool,
+    /// Joint odds of the cells, if they are not known one by one.
+    pub joint: Option<JointOdds>,
 }
 
 impl Reading {
@@ -216,6 +219,7 @@ impl TagReader {
             tile: Tile { anchor: Vertex::new(tile.anchor.col, tile.anchor.row), ..tile },
             half_odds: self.mirror.iter().map(|&bit| reading.half_odds[usize::from(bit)]).collect(),
             has_hidden: reading.has_hidden,
+            joint: None,
         }
     }
 
@@ -279,6 +283,7 @@ impl TagReader {
                 };
             }
         }
+        let joint = self.model.joint_odds(&mixing, &samples);
         let mut half_odds = mixing.half_odds(&samples);
         // Cells in a hole contain no information.
         for (bit, odds) in half_odds.iter_mut().enumerate() {
@@ -289,7 +294,7 @@ impl TagReader {
         let length = |step: DVec2| step.x.hypot(step.y);
         let has_hidden = !tile.vertices().all(|v| grid.contains_key(&v));
         let bit_px = length(along[0]).max(length(along[1]));
-        Some((Reading { tile, half_odds, has_hidden }, bit_px))
+        Some((Reading { tile, half_odds, has_hidden, joint }, bit_px))
     }
 }
 

@@ -545,7 +545,7 @@ mod tests {
             DVec2::new(100.0 + 40.0 * place.x, 300.0 - 40.0 * place.y)
         });
         let insets = Insets { tag: 0.25, cells: 0.25 };
-        let panel = TagsOfPanel { tiles: BTreeSet::new(), insets };
+        let panel = TagsOfPanel { tiles: BTreeSet::new(), insets, leave_corners_clear: true };
         let tags = TagAreas { targets: vec![(None, BTreeMap::from([(0, panel)]))] };
         let around = &surroundings(&grid, &tags, 1.0)[12];
         // Cells begin 10 px from both edges; the blur reaches 2 px.

@@ -50,7 +50,10 @@ impl TagLabeller {
         let mut shown = Vec::with_capacity(readings.len());
         for reading in &readings {
             let word = reading.word();
-            let mut of_words = self.words.evidence(&reading.half_odds);
+            let mut of_words = match &reading.joint {
+                Some(joint) => self.words.iter().map(|word| joint.evidence(word)).collect(),
+                None => self.words.evidence(&reading.half_odds),
+            };
             if let Some(max_errors) = self.max_errors {
                 for (index, evidence) in of_words.iter_mut().enumerate() {
                     if (self.words.word(index) ^ word).count_ones() > max_errors {
@@ -86,13 +89,17 @@ impl TagLabeller {
         }
         let of_target = |evidence: f32| f64::from(evidence) - among(of_words.len());
         let mut code = [most, second].map(|evidence| of_target(evidence).max(0.0));
+        let evidence_of = |word: u64| match &reading.joint {
+            Some(joint) => joint.evidence(word),
+            None => self.words.evidence_of(word, &reading.half_odds),
+        };
         // A code of the family that the target does not have may fit better than all of these.
         let mut is_foreign = false;
         if let Some(decoder) = &self.decoder
             && let Some(decoded) = decoder.decode(reading.word(), self.sure_errors)
             && self.words.code_of(decoded.id).is_none()
         {
-            let evidence = self.words.evidence_of(decoder.word(decoded), &reading.half_odds);
+            let evidence = evidence_of(decoder.word(decoded));
             let clear = f64::from(evidence) - among(self.family_words);
             if evidence > most {
                 is_foreign = true;
@@ -104,7 +111,7 @@ impl TagLabeller {
         } else if is_word(reading) && most < 0.0 {
             noted.no_codes += 1;
         }
-        let plain = f64::from(self.words.evidence_of(plain, &reading.half_odds));
+        let plain = f64::from(evidence_of(plain));
         let of_board = code.map(|code| {
             PLAIN_PARTS.map(|part| (part * plain.exp() + (1.0 - part) * code.exp()).ln())
         });

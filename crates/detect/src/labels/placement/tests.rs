@@ -44,7 +44,7 @@ fn found_by(labeller: &TagLabeller, family: &Family, shown: &Target, flopped: bo
         let code = codes.get(&tile).copied().unwrap_or(0);
         let odds = |bit: u32| if code >> bit & 1 == 1 { SURE } else { -SURE };
         let half_odds = (0..family.dimension().bits()).map(odds).collect();
-        let upright = Reading { tile, half_odds, has_hidden: false };
+        let upright = Reading { tile, half_odds, has_hidden: false, joint: None };
         if flopped { reader.mirrored(&upright) } else { upright }
     };
     let whole = |reading: &Reading| reading.tile.vertices().all(|v| grid.contains_key(&v));
@@ -212,7 +212,7 @@ fn one_tag_labels_where_nothing_contradicts_it() {
     let tag = &panel.tags[panel.tags.len() / 2];
     let of_code = |tile: Tile, code: u64, sure: f32| {
         let odds = |bit: u32| if code >> bit & 1 == 1 { sure } else { -sure };
-        Reading { tile, half_odds: (0..25).map(odds).collect(), has_hidden: false }
+        Reading { tile, half_odds: (0..25).map(odds).collect(), has_hidden: false, joint: None }
     };
     let tile = panel.tag_tile(tag);
     let beside = Tile { anchor: tile.anchor + Vertex::new(0, 1), ..tile };
@@ -261,6 +261,7 @@ fn one_natural_looking_tag_gives_no_labels() {
                 tile: panel.tag_tile(tag),
                 half_odds: (0..36).map(odds).collect(),
                 has_hidden: false,
+                joint: None,
             }
         };
         let readings: Vec<Reading> = shown.iter().map(reading).collect();
@@ -320,6 +321,7 @@ fn patches_of_dense_boards_tell_their_place() {
                     tile: on_grid,
                     half_odds: (0..9).map(odds).collect(),
                     has_hidden: false,
+                    joint: None,
                 };
                 if flopped { labeller.readers[0].mirrored(&reading) } else { reading }
             })
@@ -507,7 +509,12 @@ fn boards_of_random_words_get_no_labels() {
             let readings = tiles
                 .map(|tile| {
                     let odds = |_| if rng.random() { strength } else { -strength };
-                    Reading { tile, half_odds: (0..bits).map(odds).collect(), has_hidden: false }
+                    Reading {
+                        tile,
+                        half_odds: (0..bits).map(odds).collect(),
+                        has_hidden: false,
+                        joint: None,
+                    }
                 })
                 .collect();
             let mut evidence = TagEvidence::default();
