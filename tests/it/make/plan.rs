@@ -93,7 +93,7 @@ fn boards_are_labelled_up_to_the_stated_distance() {
 #[test]
 #[ignore = "prints a table"]
 fn photographs_of_boards() {
-    for (what, _, counts) in labelled_at([0.9, 1.0, 1.1, 1.2, 1.3, 1.4]) {
+    for (what, _, counts) in labelled_at([0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6]) {
         println!("{what}: {counts:?} of 6");
     }
 }
@@ -172,7 +172,7 @@ fn patches_of_dense_boards_are_labelled_up_to_the_stated_distance() {
 fn photographs_of_patches() {
     let windows = Windows::new();
     for tilt_deg in [0.0, 45.0, 60.0] {
-        for bit_px in [1.2, 1.3, 1.4, 1.5, 1.6, 1.7, 2.0, 3.0] {
+        for bit_px in [0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.7, 2.0, 3.0] {
             let labelled = windows.labelled(bit_px, tilt_deg);
             println!("{tilt_deg}°, {bit_px} px a cell: {labelled} of {}", Windows::VIEWS);
         }

@@ -10,9 +10,9 @@
 //! where R is the covariance of the samples due to noise and errors of the grey levels. The evidence for a word is
 //! Λ = ln L(s) − ln mean L, with the mean over random words, so that e^Λ has the mean 1 over these for any tile.
 //!
-//! The mean is estimated from a sample of words, and is reliable only if no few words dominate it. So this likelihood is
-//! used while a tile determines less than [`MAX_INFORMATION`]. Tags that determine more have cells that are known one by
-//! one.
+//! The mean is estimated from a sample of words, and is reliable only if no few words dominate it. So the noise is
+//! assumed to be so large that a tile determines at most [`MAX_INFORMATION`]; e^Λ then still has the mean 1. Tags whose
+//! single cells determine more than that are read cell by cell.
 
 use std::rc::Rc;
 
@@ -21,11 +21,14 @@ use rand::{RngCore, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// Maximum information in a tile, nats. The variance of the estimated mean, relative to its square, is up to
-/// e^6/[`COUNT`], a tenth.
-const MAX_INFORMATION: f64 = 6.0;
+/// e^7/[`COUNT`], an eighth.
+const MAX_INFORMATION: f64 = 7.0;
 
 /// Number of random words.
-const COUNT: usize = 4096;
+const COUNT: usize = 8192;
+
+/// Halvings of the interval of the noise.
+const HALVINGS: usize = 20;
 
 /// Random words.
 #[derive(Clone, Debug)]
@@ -66,14 +69,14 @@ pub(super) struct JointModel {
 
 impl JointModel {
     /// Creates the model from ½ W by sample, and the effects of errors of the grey levels with a standard deviation of
-    /// 1, for samples of this variance. Returns `None` if the cells are known one by one.
+    /// 1, for samples of this variance. Returns `None` if single cells determine more, `of_cells` nats.
     pub(super) fn new(
         half_shares: &DMatrix<f64>,
         levels: &DMatrix<f64>,
         variance: f64,
+        of_cells: f64,
         random: &RandomWords,
     ) -> Option<Self> {
-        let bits = half_shares.ncols();
         // R⁻¹ by the Woodbury identity: the errors of the grey levels are few.
         let among =
             levels.tr_mul(levels) / variance + DMatrix::identity(levels.ncols(), levels.ncols());
@@ -81,11 +84,22 @@ impl JointModel {
         let gain = (half_shares.transpose() - half_shares.tr_mul(levels) * removed) / variance;
         let matrix = &gain * half_shares;
         // That of a Gaussian with unit variance in every cell.
+        let eigenvalues = matrix.clone().symmetric_eigenvalues();
         let information =
-            (&matrix + DMatrix::identity(bits, bits)).cholesky()?.ln_determinant() / 2.0;
-        if information > MAX_INFORMATION {
+            |part: f64| eigenvalues.iter().map(|a| (part * a).ln_1p() / 2.0).sum::<f64>();
+        let (mut part, mut below) = (1.0, 0.0);
+        if information(part) > MAX_INFORMATION {
+            for _ in 0..HALVINGS {
+                let middle = (part + below) / 2.0;
+                *(if information(middle) > MAX_INFORMATION { &mut part } else { &mut below }) =
+                    middle;
+            }
+            part = below;
+        }
+        if information(part) < of_cells {
             return None;
         }
+        let (matrix, gain) = (part * matrix, part * gain);
         let rows = |m: &DMatrix<f64>| -> Vec<Vec<f32>> {
             m.row_iter().map(|row| row.iter().map(|&v| v as f32).collect()).collect()
         };

@@ -261,14 +261,16 @@ impl CellModel {
         let samples_px2 = n as f64 / (bits as f64 * self.cell_area() * area_px2);
         let variance = NOISE_WEIGHT * noise * noise * (SAMPLE_PX2 * samples_px2).max(1.0)
             + MODEL_ERROR * MODEL_ERROR * samples_px2.max(1.0);
-        let [half_shares, levels] =
-            [design.columns(0, bits), design.columns(bits, LEVELS)].map(|part| part.clone_owned());
-        let joint = JointModel::new(&half_shares, &levels, variance, self.random());
         let mut normal = design.tr_mul(&design) / variance;
         for i in 0..bits + LEVELS {
             normal[(i, i)] += 1.0;
         }
         let inverse = normal.cholesky()?.inverse();
+        let of_cell = |c: usize| (-0.5 * inverse[(c, c)].ln()).min(std::f64::consts::LN_2);
+        let [cells, levels] =
+            [design.columns(0, bits), design.columns(bits, LEVELS)].map(|part| part.clone_owned());
+        let of_cells = (0..bits).map(of_cell).sum();
+        let joint = JointModel::new(&cells, &levels, variance, of_cells, self.random());
         let gain = &inverse * design.transpose() / variance;
         let half_shares: Vec<Vec<f32>> =
             (0..n).map(|i| (0..bits).map(|c| design[(i, c)] as f32).collect()).collect();

@@ -23,7 +23,7 @@ const SATURATED: f64 = 0.985;
 const HIDING_BLUR_PX: f64 = 6.0;
 
 /// Minimum length of a readable cell on a board of tags, px, however sharp the image is.
-const MIN_BIT_PX: f64 = 1.25;
+const MIN_BIT_PX: f64 = 0.9;
 
 /// Minimum length of a readable cell, in standard deviations of the blur.
 const MIN_BIT_BLURS: f64 = 1.0;

@@ -18,7 +18,7 @@ const MOST: u32 = 40;
 /// sharp images, px. Measured on
 /// photographs of printed pages (docs/benchmarks.md). Tilted cells need the same height, because a patch has no
 /// redundant cells.
-const PATCH_BIT_PX: f64 = 1.4;
+const PATCH_BIT_PX: f64 = 1.1;
 
 /// A camera, and the distances from which it must see a board.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -13,9 +13,8 @@ pub(super) const COMFORTABLE_BIT_PX: f64 = 2.0;
 pub(super) const COMFORTABLE_EDGE_PX: f64 = 1.25 * MIN_UNTAGGED_EDGE_PX;
 
 /// Smallest size of a tag cell at which boards are labelled in sharp images, px: half of the views
-/// are labelled at 1.25,
-/// nearly all at 5 % more. Tilted cells need the same area.
-const MIN_BIT_PX: f64 = 1.3;
+/// of boards with four tags are labelled at 0.95, nearly all at 5 % more. Tilted cells need the same area.
+const MIN_BIT_PX: f64 = 1.05;
 
 /// Number of bits that sets the penalty for boards with few tags. Boards with two tags, of 32 and 50 bits in total,
 /// need 40 % and 10 % more pixels.
