@@ -89,27 +89,34 @@ impl TargetWords {
     /// Returns Λ of every word, nats: the log-likelihood ratio of the word to words drawn from the
     /// cell frequencies.
     pub(crate) fn evidence(&self, half_odds: &[f32]) -> Vec<f32> {
-        let bytes = half_odds.len().div_ceil(8);
-        // Sum of the half odds of the white cells, for each value of each byte of 8 cells.
+        let unrelated = self.unrelated(half_odds);
+        let products = self.products(half_odds).into_iter().enumerate();
+        products.map(|(index, product)| product - unrelated[index % self.rotations]).collect()
+    }
+
+    /// Returns the sum of these values over the cells, positive for white ones and negative for black ones, of every
+    /// word.
+    pub(crate) fn products(&self, values: &[f32]) -> Vec<f32> {
+        let bytes = values.len().div_ceil(8);
+        // Sum of the values of the white cells, for each value of each byte of 8 cells.
         let mut sums = vec![[0.0f32; 256]; bytes];
         for (byte, sums) in sums.iter_mut().enumerate() {
             for value in 1..256usize {
                 let lowest = value.trailing_zeros() as usize;
-                let odds = half_odds.get(8 * byte + lowest).copied().unwrap_or(0.0);
-                sums[value] = sums[value & (value - 1)] + odds;
+                let of_lowest = values.get(8 * byte + lowest).copied().unwrap_or(0.0);
+                sums[value] = sums[value & (value - 1)] + of_lowest;
             }
         }
-        let total: f32 = half_odds.iter().sum();
-        let unrelated = self.unrelated(half_odds);
-        let evidence = |(index, &word): (usize, &u64)| {
+        let total: f32 = values.iter().sum();
+        let product = |&word: &u64| {
             let white: f32 = sums
                 .iter()
                 .enumerate()
                 .map(|(byte, sums)| sums[(word >> (8 * byte) & 0xff) as usize])
                 .sum();
-            2.0 * white - total - unrelated[index % self.rotations]
+            2.0 * white - total
         };
-        self.words.iter().enumerate().map(evidence).collect()
+        self.words.iter().map(product).collect()
     }
 
     /// Returns Λ of any word, nats.

@@ -1,6 +1,7 @@
 //! Content of the tiles of a grid, independent of the placement.
 
 use std::collections::BTreeMap;
+use std::rc::Rc;
 
 use super::alternatives::{DIRTY, PLAIN_PARTS, or_spoilt};
 use super::labeller::{TagEvidence, TagLabeller, Way};
@@ -48,10 +49,21 @@ impl TagLabeller {
         let plain = self.readers[way.reader].plain_word();
         let mut evidence = Vec::with_capacity(readings.len());
         let mut shown = Vec::with_capacity(readings.len());
+        // Those of all words, by model.
+        let mut half_squares = BTreeMap::new();
         for reading in &readings {
             let word = reading.word();
             let mut of_words = match &reading.joint {
-                Some(joint) => self.words.iter().map(|word| joint.evidence(word)).collect(),
+                Some(joint) => {
+                    let of_model =
+                        half_squares.entry(Rc::as_ptr(&joint.model)).or_insert_with(|| {
+                            let all = self.words.iter();
+                            all.map(|word| joint.model.half_square(word)).collect::<Vec<f32>>()
+                        });
+                    let products = self.words.products(&joint.linear);
+                    let terms = products.into_iter().zip(of_model);
+                    terms.map(|(product, half)| joint.evidence(product, *half)).collect()
+                }
                 None => self.words.evidence(&reading.half_odds),
             };
             if let Some(max_errors) = self.max_errors {
@@ -90,7 +102,7 @@ impl TagLabeller {
         let of_target = |evidence: f32| f64::from(evidence) - among(of_words.len());
         let mut code = [most, second].map(|evidence| of_target(evidence).max(0.0));
         let evidence_of = |word: u64| match &reading.joint {
-            Some(joint) => joint.evidence(word),
+            Some(joint) => joint.evidence_of(word),
             None => self.words.evidence_of(word, &reading.half_odds),
         };
         // A code of the family that the target does not have may fit better than all of these.
