@@ -78,10 +78,6 @@ pub(crate) fn no_labels(evidence: &TagEvidence, grid: &SaddleGrid, size: [usize;
         let tags = evidence.foreign_ids.len() as f64;
         return Reason::new(ReasonKind::OtherIds, [("tags", tags), ("id", f64::from(id))]);
     }
-    if let Some([agreeing, disagreeing]) = evidence.contradicted {
-        let figures = [("agreeing", agreeing as f64), ("disagreeing", disagreeing as f64)];
-        return Reason::new(ReasonKind::OtherLayout, figures);
-    }
     if evidence.tiles == 0 {
         return Reason::new(ReasonKind::NoTiles, [corners]);
     }
@@ -90,6 +86,10 @@ pub(crate) fn no_labels(evidence: &TagEvidence, grid: &SaddleGrid, size: [usize;
     if bit_px < needed_bit_px {
         let figures = [("bit_px", bit_px), ("blur_px", blur_px), ("needed_bit_px", needed_bit_px)];
         return Reason::new(ReasonKind::UnreadableTags, figures);
+    }
+    if let Some([agreeing, disagreeing]) = evidence.contradicted {
+        let figures = [("agreeing", agreeing as f64), ("disagreeing", disagreeing as f64)];
+        return Reason::new(ReasonKind::OtherLayout, figures);
     }
     if 2 * evidence.unread > evidence.tiles {
         let mut figures = vec![("bit_px", bit_px), ("blur_px", blur_px)];
