@@ -413,11 +413,13 @@ impl Refiner {
         let window = &*window;
         let edges: &[Edge; K] = room.around.edges.as_slice().try_into().ok()?;
         let angles = edges.map(|edge| edge.angle_rad);
+        let mut is_clipped = false;
         let (first, accuracy) = match before {
             _ if window.count() < MIN_PIXELS => return None,
             Some(fit) => (fit.corner.with_edges(), Accuracy::Full),
             None => {
                 let pixels = fitter.pixels(image, window, position)?;
+                is_clipped = pixels.iter().any(|&pixel| pixel >= 1.0);
                 let off = window.off_borders(pixels, position - position.round());
                 let (places, pixels) = match &off {
                     Some([us, vs, pixels]) => ([&us[..], &vs[..]], &pixels[..]),
@@ -434,8 +436,8 @@ impl Refiner {
         // edges that are almost parallel far from their positions.
         let are_shared = *room.optics != self.known;
         let known = are_shared.then_some(&self.known);
-        let is_rough = before.is_none() && !room.optics.is_toned();
-        let toned = self.toned.as_ref().filter(|_| is_rough);
+        let is_first = before.is_none() && !are_shared && !is_clipped;
+        let toned = self.toned.as_ref().filter(|_| is_first);
         let mut tried = [Some(room.optics), known, toned].into_iter().flatten();
         let fit = tried.find_map(|optics| fitter.fit(image, window, &first, optics, accuracy))?;
         Some(fit.into())
