@@ -14,9 +14,8 @@ const FILLED: f64 = 0.9;
 const LEAST: [u32; 2] = [4, 5];
 const MOST: u32 = 40;
 
-/// Smallest cell size of a position code at which patches of three by four tiles are labelled in
-/// sharp images, px. Measured on
-/// photographs of printed pages (docs/benchmarks.md). Tilted cells need the same height, because a patch has no
+/// Smallest cell size of a position code at which patches of three by four tiles are labelled in sharp images, px.
+/// Measured on photographs of printed pages (docs/benchmarks.md). Tilted cells need the same height, because a patch has no
 /// redundant cells.
 const PATCH_BIT_PX: f64 = 1.1;
 

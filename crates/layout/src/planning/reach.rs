@@ -12,8 +12,8 @@ pub(super) const COMFORTABLE_BIT_PX: f64 = 2.0;
 /// The same for the tile edge of a board without tags, px.
 pub(super) const COMFORTABLE_EDGE_PX: f64 = 1.25 * MIN_UNTAGGED_EDGE_PX;
 
-/// Smallest size of a tag cell at which boards are labelled in sharp images, px: half of the views
-/// of boards with four tags are labelled at 0.95, nearly all at 5 % more. Tilted cells need the same area.
+/// Smallest size of a tag cell at which boards are labelled in sharp images, px: half of the views of boards with four
+/// tags are labelled at 0.95, nearly all at 5 % more. Tilted cells need the same area.
 const MIN_BIT_PX: f64 = 1.05;
 
 /// Number of bits that sets the penalty for boards with few tags. Boards with two tags, of 32 and 50 bits in total,
