@@ -2,9 +2,9 @@
 //!
 //! A finger over a board splits it into grids that no link joins, and single corners without a
 //! completely visible tile. The local map of a grid ([`LocalMap`]) predicts where its lattice
-//! continues behind the finger, and its homography ([`PlaneMap`](super::map::plane_map::PlaneMap)) behind a hand. A corner there belongs to the board if
-//! it lies at a vertex and all its edges have the predicted directions and dark sides. A grid belongs to the same board
-//! if all its corners for which there is a prediction do.
+//! continues behind the finger, and its homography (`PlaneMap`) behind a hand. A corner there belongs
+//! to the board if it lies at a vertex and all its edges have the predicted directions and dark
+//! sides. A grid belongs to the same board if all its corners for which there is a prediction do.
 
 use std::collections::BTreeMap;
 
