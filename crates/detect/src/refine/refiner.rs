@@ -200,7 +200,8 @@ pub struct Refiner {
     tone: Tone,
     /// Optics known before any image.
     pub(crate) known: Optics,
-    /// The same with a usual tone curve, if it is unknown.
+    /// Optics with a usual tone curve and without ink, whose first estimate may be wrong at grazing angles, for first fits
+    /// under an unknown curve.
     toned: Option<Optics>,
 }
 
@@ -419,13 +420,14 @@ impl Refiner {
             Some(fit) => (fit.corner.with_edges(), Accuracy::Full),
             None => {
                 let pixels = fitter.pixels(image, window, position)?;
-                is_clipped = pixels.iter().any(|&pixel| pixel >= 1.0);
                 let off = window.off_borders(pixels, position - position.round());
                 let (places, pixels) = match &off {
                     Some([us, vs, pixels]) => ([&us[..], &vs[..]], &pixels[..]),
                     None => (window.places(), pixels),
                 };
-                (start_along(places, pixels, position, angles, room.blur_px)?, Accuracy::Rough)
+                let first = start_along(places, pixels, position, angles, room.blur_px)?;
+                is_clipped = fitter.is_white_clipped();
+                (first, Accuracy::Rough)
             }
         };
         let edges = first.angles.map(|angle_rad| edge_along(edges, angle_rad));

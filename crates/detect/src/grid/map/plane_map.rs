@@ -30,8 +30,8 @@ const MIN_DENOMINATOR: f64 = 0.1;
 /// The homography of a grid.
 #[derive(Clone, Debug)]
 pub(crate) struct PlaneMap {
-    /// Vertex near the middle of the grid, position of the middle relative to it, and RMS distance from the middle, in
-    /// mean spacings.
+    /// A vertex of the grid, and the middle of all relative to it and their RMS distance from the middle, in mean
+    /// spacings.
     origin: Vertex,
     middle: DVec2,
     size: f64,
@@ -56,7 +56,10 @@ impl PlaneMap {
     /// Fits the map to the corners of a grid: their vertices and positions. Returns `None` if they are too few or nearly
     /// collinear.
     pub(crate) fn of(corners: &[(Vertex, DVec2)], shape: Shape) -> Option<Self> {
-        let &(origin, _) = corners.first()?;
+        if corners.len() < LEAST {
+            return None;
+        }
+        let (origin, _) = corners[0];
         let count = corners.len() as f64;
         let ways: Vec<DVec2> =
             corners.iter().map(|&(v, _)| shape.spacing.way(origin, v - origin)).collect();
@@ -69,9 +72,6 @@ impl PlaneMap {
             .zip(corners)
             .map(|(way, (_, at))| ((way - middle) / size, at - place))
             .collect();
-        if points.len() < LEAST {
-            return None;
-        }
         let (mut params, mut inverse) = (SVector::zeros(), SMatrix::zeros());
         for _ in 0..FITS {
             let mut normal = SMatrix::<f64, PARAMS, PARAMS>::zeros();
@@ -99,7 +99,8 @@ impl PlaneMap {
 
     /// Returns the map about a vertex; `None` if it is not in front of the camera.
     pub(crate) fn about(&self, vertex: Vertex) -> Option<LocalMap> {
-        let p = self.relative(self.shape.spacing.way(self.origin, vertex - self.origin));
+        let way = self.shape.spacing.way(self.origin, vertex - self.origin);
+        let p = (way - self.middle) / self.size;
         let below = denominator(&self.params, p);
         if below < MIN_DENOMINATOR {
             return None;
@@ -129,10 +130,6 @@ impl PlaneMap {
         }
         let steps = self.shape.spacing.steps(self.origin, p * self.size + self.middle);
         Some(self.origin + Vertex::new(steps.y.round() as i32, steps.x.round() as i32))
-    }
-
-    fn relative(&self, way: DVec2) -> DVec2 {
-        (way - self.middle) / self.size
     }
 }
 

@@ -279,6 +279,11 @@ impl CornerFitter {
         Some(centre)
     }
 
+    /// Returns whether the sensor clipped the brightest of the loaded pixels.
+    pub(crate) fn is_white_clipped(&self) -> bool {
+        self.limits[1] != UNLIMITED[1]
+    }
+
     /// Returns the pixels around a position, with a full scale of 1; `None` if one lies outside the
     /// image.
     pub(crate) fn pixels(
