@@ -8,19 +8,21 @@
 //! ```
 //!
 //! with the normal n of the edge, the covariance Σ of the blur, and the curvature κ of the camera's tone curve. Edges
-//! of several directions determine Σ, so motion counts as blur.
+//! of several directions determine Σ. On checkerboards, which have only two directions, the brightness at the corners
+//! completes it. If the blur is wider in one direction, S is also fitted as a Gaussian convolved with a box, as by
+//! motion along a line at constant speed.
 //!
-//! Limitations: motion is modelled as a Gaussian of the same variance, and the whole grid has one
-//! blur. Where white is saturated, less of the edge is visible: above a share θ of white,
+//! Limitations: the whole grid has one blur. Where white is saturated, less of the edge is visible: above a share θ of white,
 //! everything is as bright as white, and S is clipped.
 
 use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec2;
 use nalgebra::{Matrix3, Vector3};
 
+use super::grid_blur::{EdgeBlur, GridBlur, Spread, row};
 use crate::grid::saddle_grid::SaddleGrid;
-use crate::refine::blurred_corner::erf_sqrt_half;
 use deltille_core::lattice::{GridKind, Tile, Vertex};
 use deltille_core::raster::ImageView;
 
@@ -46,8 +48,8 @@ const BLUR_STEPS: i32 = 26;
 /// Stride of the coarse search. A search of all steps around the best one follows.
 const COARSE_STEPS: i32 = 4;
 
-/// Number of edges per direction that determine the clipping of white.
-const CLIPPED_EDGES: usize = 20;
+/// Number of edges per direction with which clipping and motion are searched for.
+const SOME_EDGES: usize = 20;
 
 /// Fraction of full scale from which a pixel may be saturated.
 const SATURATED: f64 = 0.985;
@@ -99,8 +101,8 @@ pub(crate) struct ClearDepth {
 /// Light and blur of a grid.
 #[derive(Clone, Debug)]
 pub(crate) struct GridLight {
-    /// Covariance of the blur xx, xy, yy, px²: lens, motion, pixel and interpolation together.
-    pub blur_px2: [f64; 3],
+    /// Lens, motion, pixel and interpolation together.
+    pub blur: GridBlur,
     /// κ.
     pub tone: f64,
     /// θ: the share of white from which pixels are saturated; 1 if white is not saturated.
@@ -145,7 +147,7 @@ impl GridLight {
     ) -> Option<Self> {
         let directions = kind.steps().len() / 2;
         let mut light = Self {
-            blur_px2: [1.0, 0.0, 1.0],
+            blur: GridBlur::gaussian(&[], &[]),
             tone: 0.0,
             clipped_share: 1.0,
             noise: 0.0,
@@ -170,46 +172,92 @@ impl GridLight {
             let least = MIN_DEVIATION * f64::from(image.full_scale());
             light.clipped_share = clipped_share(&by_direction, least);
         }
-        let (mut curvature, mut power) = (0.0, 0.0);
-        let (mut squares, mut freedom) = (0.0, 0.0);
-        let mut variances = 0.0;
-        let mut widths = Vec::new();
+        let mut variances = Vec::new();
+        let mut sigmas_px = Vec::new();
         for profiles in by_direction.iter().filter(|profiles| !profiles.is_empty()) {
-            let all: Vec<&Profile> = profiles.iter().collect();
-            let (sigma_px, _) = best_width(&all, light.clipped_share);
-            let mut outer = [0.0; 3];
-            for profile in profiles {
-                let DVec2 { x, y } = profile.normal;
-                let share = 1.0 / profiles.len() as f64;
-                outer = [0, 1, 2].map(|i| outer[i] + share * [x * x, 2.0 * x * y, y * y][i]);
-                if let Some(fit) = profile.fit(sigma_px, light.clipped_share) {
-                    curvature += fit.half_contrast * fit.curved;
-                    power += fit.half_contrast.powi(2);
-                    variances += profile.variance;
-                    squares += fit.squares;
-                    freedom += (ACROSS - 3) as f64 * fit.half_contrast.powi(2);
-                }
-            }
-            widths.push((outer, sigma_px * sigma_px));
+            let (sigma_px, _) =
+                best_width(&profiles.iter().collect::<Vec<_>>(), light.clipped_share);
+            let share = 1.0 / profiles.len() as f64;
+            let rows = profiles.iter().map(|profile| row(profile.normal, profile.normal));
+            let mean = rows.fold([0.0; 3], |sum, row| [0, 1, 2].map(|i| sum[i] + share * row[i]));
+            variances.push(Spread { row: mean, value_px2: sigma_px * sigma_px });
+            sigmas_px.extend(std::iter::repeat_n(EdgeBlur::gaussian(sigma_px), profiles.len()));
         }
-        if power <= 0.0 {
+        let mut fitted = Fitted::of(all().zip(sigmas_px), light.clipped_share);
+        light.set_tone(&fitted)?;
+        light.blur = GridBlur::gaussian(&variances, &[]);
+        if kind == GridKind::Checker {
+            let diagonal = light.diagonal(image, grid);
+            light.blur = GridBlur::gaussian(&variances, diagonal.as_slice());
+        }
+        let some: Vec<&Profile> = some_of(&by_direction).into_iter().flatten().collect();
+        let cost = |blur: &GridBlur| {
+            let fits = some.iter().map(|profile| (*profile, blur.across(profile.normal)));
+            Fitted::of(fits, light.clipped_share).squares
+        };
+        if let Some((motion, _)) = light.blur.as_motion(cost) {
+            let swept = all().map(|profile| (profile, motion.across(profile.normal)));
+            let swept = Fitted::of(swept, light.clipped_share);
+            if swept.squares < fitted.squares {
+                (fitted, light.blur) = (swept, motion);
+                light.set_tone(&fitted)?;
+            }
+        }
+        // Contrasts are twice the amplitude. Residuals of the fits include blur of another shape, but hardly any noise
+        // where samples are denser than pixels.
+        let left = fitted.squares / fitted.freedom * ALONG.len() as f64;
+        light.noise = left.max(fitted.variances / fitted.power).sqrt() / 2.0;
+        Some(light)
+    }
+
+    /// Sets the curvature of the tone curve; `None` without contrast.
+    fn set_tone(&mut self, fitted: &Fitted) -> Option<()> {
+        if fitted.power <= 0.0 {
             return None;
         }
-        light.tone = (curvature / power).clamp(-MAX_CURVATURE, MAX_CURVATURE);
-        if light.clipped_share < 1.0 {
-            light.tone = 0.0;
+        self.tone = (fitted.curvature / fitted.power).clamp(-MAX_CURVATURE, MAX_CURVATURE);
+        if self.clipped_share < 1.0 {
+            self.tone = 0.0;
         }
-        // Contrasts are twice the amplitude. Residuals of the fits include blur that is not Gaussian, but hardly any
-        // noise where samples are denser than pixels.
-        let left = squares / freedom * ALONG.len() as f64;
-        light.noise = left.max(variances / power).sqrt() / 2.0;
-        light.blur_px2 = covariance(&widths);
-        Some(light)
+        Some(())
+    }
+
+    /// Measures the blur along the diagonals of a checkerboard. With the correlation ρ of the blur across both edges, the
+    /// brightness at a corner is 2/π asin ρ.
+    fn diagonal(&self, image: ImageView, grid: &SaddleGrid) -> Option<Spread> {
+        let steps = self.kind.steps();
+        let every = grid.len().div_ceil(BLUR_EDGES).max(1);
+        let (mut sum, mut rows, mut count) = (0.0, [0.0; 3], 0.0);
+        for (&vertex, placed) in grid.iter().step_by(every) {
+            let [Some(first), Some(second)] = [0, 1].map(|k| self.profile(image, grid, vertex, k))
+            else {
+                continue;
+            };
+            let next = grid[&(vertex + steps[1])].position - placed.position;
+            // Both normals on the side of the tile between the steps.
+            let towards = |normal: DVec2, step: DVec2| normal * normal.dot(step).signum();
+            let along = grid[&(vertex + steps[0])].position - placed.position;
+            let normals = [towards(first.normal, next), towards(second.normal, along)];
+            let is_bright = first.normal.dot(next) > 0.0;
+            let levels = [&first, &second].map(|profile| self.edge_levels(profile));
+            let [Some(a), Some(b)] = levels else { continue };
+            let DVec2 { x, y } = placed.position;
+            let [dark, contrast] = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])];
+            let share = self.share((f64::from(image.bilinear(x, y)) - dark) / contrast);
+            let brightness = (2.0 * share - 1.0).clamp(-1.0, 1.0);
+            let rho = (FRAC_PI_2 * if is_bright { brightness } else { -brightness }).sin();
+            let [s, t] = normals.map(|normal| self.blur.across(normal).sigma_px);
+            sum += rho * s * t;
+            let row = row(normals[0], normals[1]);
+            rows = [0, 1, 2].map(|i| rows[i] + row[i]);
+            count += 1.0;
+        }
+        (count > 0.0).then(|| Spread { row: rows.map(|of| of / count), value_px2: sum / count })
     }
 
     /// Returns the standard deviation of the blur, px, averaged over all directions.
     pub(crate) fn blur_px(&self) -> f64 {
-        (0.5 * (self.blur_px2[0] + self.blur_px2[2])).sqrt()
+        self.blur.mean_px()
     }
 
     /// Returns the share of white in a pixel. `brightness` is on the scale of black 0 and white 1.
@@ -283,12 +331,10 @@ impl GridLight {
 
     /// Returns the level of black at an edge, and the contrast to white.
     fn edge_levels(&self, profile: &Profile) -> Option<[f64; 2]> {
-        let DVec2 { x, y } = profile.normal;
-        let [xx, xy, yy] = self.blur_px2;
-        let sigma_px = (x * x * xx + 2.0 * x * y * xy + y * y * yy).max(0.0).sqrt();
+        let blur = self.blur.across(profile.normal);
         let (mut n, mut s1, mut s2, mut v1, mut v2) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for (&d, &value) in profile.distances_px.iter().zip(&profile.values) {
-            let s = shown(d, sigma_px, self.clipped_share);
+            let s = shown(d, blur, self.clipped_share);
             let s = s + self.tone * (1.0 - s * s);
             n += 1.0;
             s1 += s;
@@ -369,10 +415,37 @@ impl GridLight {
 
 /// Returns the visible part of S at a distance from an edge, if everything above a share of white
 /// looks white. Scale: black is −1, and apparent white is 1.
-fn shown(distance_px: f64, sigma_px: f64, clipped_share: f64) -> f64 {
-    let s = f64::from(erf_sqrt_half((distance_px / sigma_px) as f32));
-    let share = (0.5 + 0.5 * s).min(clipped_share) / clipped_share;
+fn shown(distance_px: f64, blur: EdgeBlur, clipped_share: f64) -> f64 {
+    let share = (0.5 + 0.5 * blur.step(distance_px)).min(clipped_share) / clipped_share;
     2.0 * share - 1.0
+}
+
+/// Sums over the fits of profiles.
+#[derive(Default)]
+struct Fitted {
+    /// κ, weighted by the power.
+    curvature: f64,
+    /// Squares of half the contrast.
+    power: f64,
+    variances: f64,
+    squares: f64,
+    freedom: f64,
+}
+
+impl Fitted {
+    fn of<'a>(profiles: impl Iterator<Item = (&'a Profile, EdgeBlur)>, clipped_share: f64) -> Self {
+        let mut sums = Self::default();
+        for (profile, blur) in profiles {
+            if let Some(fit) = profile.fit(blur, clipped_share) {
+                sums.curvature += fit.half_contrast * fit.curved;
+                sums.power += fit.half_contrast.powi(2);
+                sums.variances += profile.variance;
+                sums.squares += fit.squares;
+                sums.freedom += (ACROSS - 3) as f64 * fit.half_contrast.powi(2);
+            }
+        }
+        sums
+    }
 }
 
 struct ProfileFit {
@@ -384,12 +457,12 @@ struct ProfileFit {
 
 impl Profile {
     /// Fits o, a and aκ by least squares.
-    fn fit(&self, sigma_px: f64, clipped_share: f64) -> Option<ProfileFit> {
+    fn fit(&self, blur: EdgeBlur, clipped_share: f64) -> Option<ProfileFit> {
         let mut normal = Matrix3::<f64>::zeros();
         let mut right = Vector3::zeros();
         let mut power = 0.0;
         for (&d, &value) in self.distances_px.iter().zip(&self.values) {
-            let s = shown(d, sigma_px, clipped_share);
+            let s = shown(d, blur, clipped_share);
             let row = Vector3::new(1.0, s, 1.0 - s * s);
             normal += row * row.transpose();
             right += row * value;
@@ -419,61 +492,31 @@ fn best_step(
     steps: impl Iterator<Item = i32>,
 ) -> (i32, f64) {
     let left = |step: i32| {
-        let sigma_px = MIN_BLUR_PX * BLUR_STEP.powi(step);
+        let blur = EdgeBlur::gaussian(MIN_BLUR_PX * BLUR_STEP.powi(step));
         // If nothing of the edge remains visible, it cannot be fitted.
         let squares = profiles
             .iter()
-            .map(|p| p.fit(sigma_px, clipped_share).map_or(f64::INFINITY, |fit| fit.squares));
+            .map(|p| p.fit(blur, clipped_share).map_or(f64::INFINITY, |fit| fit.squares));
         squares.sum::<f64>()
     };
     let all = steps.map(|step| (step, left(step)));
     all.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::INFINITY))
 }
 
+/// Returns some profiles of each direction.
+fn some_of(by_direction: &[Vec<Profile>]) -> Vec<Vec<&Profile>> {
+    let some = |profiles: &Vec<Profile>| profiles.len().div_ceil(SOME_EDGES).max(1);
+    by_direction.iter().map(|profiles| profiles.iter().step_by(some(profiles)).collect()).collect()
+}
+
 /// Returns θ, the largest share for which edges of all directions fit nearly best, or fit within
 /// the scatter of samples with this standard deviation.
 fn clipped_share(by_direction: &[Vec<Profile>], deviation: f64) -> f64 {
-    let some: Vec<Vec<&Profile>> = by_direction
-        .iter()
-        .map(|profiles| {
-            profiles.iter().step_by(profiles.len().div_ceil(CLIPPED_EDGES).max(1)).collect()
-        })
-        .collect();
+    let some = some_of(by_direction);
     let left = |share: f64| some.iter().map(|profiles| best_width(profiles, share).1).sum::<f64>();
     let samples = ACROSS * some.iter().map(Vec::len).sum::<usize>();
     let tried = CLIPPED_SHARES.map(|share| (left(share), share));
     let least = tried.iter().map(|(left, _)| *left).fold(f64::INFINITY, f64::min);
     let limit = CLIPPING_GAIN * least.max(samples as f64 * deviation * deviation);
     tried.into_iter().find(|(left, _)| *left <= limit).map_or(1.0, |(_, share)| share)
-}
-
-/// Returns the covariance Σ whose variances nᵀΣn fit the given ones best. Where the directions do
-/// not determine it, a weak prior makes it isotropic.
-fn covariance(widths: &[([f64; 3], f64)]) -> [f64; 3] {
-    /// Weight of the isotropic prior, relative to the equation of one direction.
-    const ROUND: f64 = 0.01;
-    /// Minimum variance in any direction, relative to that of the sharpest edges. It keeps Σ
-    /// positive definite. Motion may blur another direction less than all edge directions. From
-    /// 0.15 to 0.6, the number of tags read under strong motion changes by 0.8 %; with 1 it is 2 %
-    /// lower.
-    const SHARPEST: f64 = 0.3;
-    let mean = widths.iter().map(|w| w.1).sum::<f64>() / widths.len().max(1) as f64;
-    let mut normal = Matrix3::<f64>::identity() * ROUND;
-    let mut right = Vector3::new(mean, 0.0, mean) * ROUND;
-    for &(row, variance) in widths {
-        let row = Vector3::from(row);
-        normal += row * row.transpose();
-        right += row * variance;
-    }
-    let solution =
-        normal.try_inverse().map_or(Vector3::new(mean, 0.0, mean), |inverse| inverse * right);
-    // Never sharper than the sharpest direction, so that Σ stays positive definite.
-    let least = widths.iter().map(|w| w.1).fold(mean, f64::min) * SHARPEST;
-    let (half_sum, half_difference) =
-        (0.5 * (solution.x + solution.z), 0.5 * (solution.x - solution.z));
-    let radius = half_difference.hypot(solution.y);
-    let (low, high) = ((half_sum - radius).max(least), (half_sum + radius).max(least));
-    let scale = if radius > 0.0 { 0.5 * (high - low) / radius } else { 0.0 };
-    let middle = 0.5 * (high + low);
-    [middle + scale * half_difference, scale * solution.y, middle - scale * half_difference]
 }

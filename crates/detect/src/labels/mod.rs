@@ -10,6 +10,7 @@
 //! 5. `grid_labels` labels each grid, by tags or by an outline; `why` finds the reason for missing labels, and
 //!    `other_settings` the settings of the target with which the tags would fit.
 
+pub(crate) mod grid_blur;
 pub(crate) mod grid_labels;
 pub(crate) mod grid_light;
 pub(crate) mod joint_cells;

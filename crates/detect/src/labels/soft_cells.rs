@@ -22,10 +22,11 @@ use std::rc::Rc;
 use std::sync::OnceLock;
 
 use glam::DVec2;
-use nalgebra::{DMatrix, Matrix2};
+use nalgebra::{DMatrix, Matrix2, Vector2};
 
+use super::grid_blur::GridBlur;
 use super::joint_cells::{JointModel, JointOdds, RandomWords};
-use crate::refine::blurred_corner::erf_sqrt_half;
+use crate::refine::blurred_corner::{erf_sqrt_half, swept_edge};
 use deltille_core::lattice::{GridKind, TagCells};
 
 /// Subdivision of a cell: a triangle has 3² parts, a square twice as many.
@@ -40,6 +41,12 @@ const LOG_VARIANCE_STEP: f64 = 0.3;
 
 /// Step between distinct correlations of the blur: a fifth.
 const CORRELATION_STEP: f64 = 0.2;
+
+/// Step between distinct motions, bit-widths. It changes the standard deviation of the blur as little as the steps above.
+const WAY_STEP_BITS: f64 = 0.25;
+
+/// Half of a motion, in σ of the blur, that is ignored: it adds 0.3 % to the blur.
+const MIN_WAY_SIGMAS: f64 = 0.1;
 
 /// Standard deviation of a sample due to model errors, relative to the contrast: positions, shape
 /// of the blur, dirt.
@@ -105,8 +112,10 @@ pub(crate) struct CellModel {
 /// Blur in tile coordinates, and noise.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TileBlur {
-    /// Covariance uu, uv, vv, bit-widths².
+    /// Covariance uu, uv, vv of its Gaussian part, bit-widths².
     pub covariance: [f64; 3],
+    /// Half of the motion along a line, bit-widths.
+    pub way: DVec2,
     /// Area of a squared bit-width of tile coordinates, px².
     pub area_px2: f64,
     /// Standard deviation of a sample, relative to the contrast.
@@ -132,7 +141,7 @@ pub(crate) struct Mixing {
 }
 
 /// Cache of mixings, by quantised blur.
-pub(crate) type Mixings = BTreeMap<[i32; 3], Rc<Mixing>>;
+pub(crate) type Mixings = BTreeMap<[i32; 5], Rc<Mixing>>;
 
 /// A sample of a tile on the scale of black 0 and white 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -220,6 +229,8 @@ impl CellModel {
             (uu.ln() / LOG_VARIANCE_STEP).round() as i32,
             (vv.ln() / LOG_VARIANCE_STEP).round() as i32,
             (uv / (uu * vv).sqrt() / CORRELATION_STEP).round() as i32,
+            (blur.way.x / WAY_STEP_BITS).round() as i32,
+            (blur.way.y / WAY_STEP_BITS).round() as i32,
         ];
         if let Some(mixing) = known.get(&key) {
             return Some(Rc::clone(mixing));
@@ -228,35 +239,45 @@ impl CellModel {
         let correlation =
             (f64::from(key[2]) * CORRELATION_STEP).clamp(-MAX_CORRELATION, MAX_CORRELATION);
         let covariance = [uu, correlation * (uu * vv).sqrt(), vv];
-        let mixing = Rc::new(self.make(covariance, blur.area_px2, blur.noise)?);
+        let way = WAY_STEP_BITS * DVec2::new(f64::from(key[3]), f64::from(key[4]));
+        let mixing = Rc::new(self.make(TileBlur { covariance, way, ..blur })?);
         known.insert(key, Rc::clone(&mixing));
         Some(mixing)
     }
 
-    fn make(&self, [uu, uv, vv]: [f64; 3], area_px2: f64, noise: f64) -> Option<Mixing> {
+    fn make(&self, blur: TileBlur) -> Option<Mixing> {
+        let TileBlur { covariance: [uu, uv, vv], way, area_px2, noise } = blur;
         let determinant = uu * vv - uv * uv;
         if determinant <= 0.0 || determinant.is_nan() {
             return None;
         }
+        let product = |a: DVec2, b: DVec2| {
+            (vv * a.x * b.x - uv * (a.x * b.y + a.y * b.x) + uu * a.y * b.y) / determinant
+        };
+        let way_sigmas = product(way, way).sqrt();
         let (n, bits) = (self.points.len(), self.bits);
         let mut design = DMatrix::<f64>::zeros(n, bits + LEVELS);
         let part_area = 1.0 / (self.parts.len() / bits) as f64 * self.cell_area();
         let gain = part_area / (std::f64::consts::TAU * determinant.sqrt());
         for (i, point) in self.points.iter().enumerate() {
             for &(bit, part) in &self.parts {
-                let DVec2 { x: du, y: dv } = (point - part) * self.width;
-                let distance2 = (vv * du * du - 2.0 * uv * du * dv + uu * dv * dv) / determinant;
-                if distance2 < FAR_SIGMAS2 {
-                    design[(i, bit)] += 0.5 * gain * (-0.5 * distance2).exp();
-                }
+                let off = (point - part) * self.width;
+                design[(i, bit)] += 0.5
+                    * gain
+                    * if way_sigmas < MIN_WAY_SIGMAS {
+                        near(product(off, off))
+                    } else {
+                        let along = product(off, way) / way_sigmas;
+                        let across2 = product(off, off) - along * along;
+                        near(across2) * mean_bell(along, way_sigmas)
+                    };
             }
             design[(i, bits)] = LEVEL_ERROR;
             let off_middle = point - self.kind.middle();
             design[(i, bits + 1)] = SLOPE_ERROR * off_middle.x;
             design[(i, bits + 2)] = SLOPE_ERROR * off_middle.y;
         }
-        let white: Vec<f64> =
-            self.points.iter().map(|&p| self.white_beyond(p, [uu, uv, vv])).collect();
+        let white: Vec<f64> = self.points.iter().map(|&p| self.white_beyond(p, &blur)).collect();
         // The noise of samples that are denser than pixels is correlated.
         let samples_px2 = n as f64 / (bits as f64 * self.cell_area() * area_px2);
         let variance = NOISE_WEIGHT * noise * noise * (SAMPLE_PX2 * samples_px2).max(1.0)
@@ -300,17 +321,20 @@ impl CellModel {
     }
 
     /// Returns the share of the white around the border in a sample.
-    fn white_beyond(&self, point: DVec2, [uu, uv, vv]: [f64; 3]) -> f64 {
-        let beyond = |inside_bits: f64, variance: f64| {
-            0.5 - 0.5 * f64::from(erf_sqrt_half((inside_bits / variance.sqrt()) as f32))
+    fn white_beyond(&self, point: DVec2, blur: &TileBlur) -> f64 {
+        let ([uu, uv, vv], way) = (blur.covariance, blur.way);
+        let beyond = |inside_bits: f64, variance: f64, way: f64| {
+            let sigmas = |bits: f64| (bits / variance.sqrt()) as f32;
+            0.5 - 0.5 * f64::from(swept_edge(sigmas(inside_bits), sigmas(way)))
         };
         let (margin, width) = (self.margin_bits, self.width);
         let DVec2 { x: u, y: v } = point * width;
+        let (in_u, in_v) = (|u| beyond(u - margin, uu, way.x), |v| beyond(v - margin, vv, way.y));
         let far = match self.kind {
-            GridKind::Deltille => beyond(width - u - v - margin, uu + 2.0 * uv + vv),
-            GridKind::Checker => beyond(width - u - margin, uu) + beyond(width - v - margin, vv),
+            GridKind::Deltille => beyond(width - u - v - margin, uu + 2.0 * uv + vv, way.x + way.y),
+            GridKind::Checker => in_u(width - u) + in_v(width - v),
         };
-        (beyond(u - margin, uu) + beyond(v - margin, vv) + far).min(1.0)
+        (in_u(u) + in_v(v) + far).min(1.0)
     }
 }
 
@@ -370,6 +394,17 @@ impl Mixing {
     }
 }
 
+/// Returns the weight of a Gaussian blur at a squared distance in σ, relative to that in the centre.
+fn near(distance2: f64) -> f64 {
+    if distance2 < FAR_SIGMAS2 { (-0.5 * distance2).exp() } else { 0.0 }
+}
+
+/// Returns the mean of exp(−x²/2) over `reach` on each side.
+fn mean_bell(x: f64, reach: f64) -> f64 {
+    let [ahead, behind] = [x + reach, x - reach].map(|x| f64::from(erf_sqrt_half(x as f32)));
+    (std::f64::consts::PI / 2.0).sqrt() * (ahead - behind) / (2.0 * reach)
+}
+
 /// Returns the mean of a normal distribution truncated below at `least`.
 fn mean_above(least: f32, mean: f32, deviation: f32) -> f32 {
     let deviation = deviation.max(MIN_SPREAD);
@@ -403,15 +438,19 @@ fn parts_of(cell: &[DVec2]) -> Vec<DVec2> {
     middles.collect()
 }
 
-/// Converts a covariance xx, xy, yy, px², to tile coordinates whose unit steps along u and v are the vectors `a` and
-/// `b`, px. Also returns the area of a unit square, px².
-pub(crate) fn in_tile([xx, xy, yy]: [f64; 3], [a, b]: [DVec2; 2]) -> Option<([f64; 3], f64)> {
+/// Converts a blur to tile coordinates whose unit steps
+/// along u and v are the vectors `a` and `b`, px.
+pub(crate) fn in_tile(blur: &GridBlur, [a, b]: [DVec2; 2], noise: f64) -> Option<TileBlur> {
+    let ([xx, xy, yy], way) = (blur.covariance_px2, blur.way_px);
     let jacobian = Matrix2::new(a.x, b.x, a.y, b.y);
-    let determinant = jacobian.determinant().abs();
+    let area_px2 = jacobian.determinant().abs();
     let inverse = jacobian.try_inverse()?;
     let covariance = Matrix2::new(xx, xy, xy, yy);
     let mapped = inverse * covariance * inverse.transpose();
-    Some(([mapped[(0, 0)], mapped[(0, 1)], mapped[(1, 1)]], determinant))
+    let way = inverse * Vector2::new(way.x, way.y);
+    let (covariance, way) =
+        ([mapped[(0, 0)], mapped[(0, 1)], mapped[(1, 1)]], DVec2::new(way.x, way.y));
+    Some(TileBlur { covariance, way, area_px2, noise })
 }
 
 #[cfg(test)]
@@ -482,7 +521,7 @@ mod tests {
             GridKind::Deltille => [4.0 / 3.0, -2.0 / 3.0, 4.0 / 3.0].map(|of| of * variance),
             GridKind::Checker => [variance, 0.0, variance],
         };
-        TileBlur { covariance, area_px2: 16.0, noise: 0.05 }
+        TileBlur { covariance, way: DVec2::ZERO, area_px2: 16.0, noise: 0.05 }
     }
 
     /// The model reads tags that are rendered and blurred independently of it. Under weak blur, all

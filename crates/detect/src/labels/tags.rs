@@ -7,7 +7,7 @@ use glam::DVec2;
 
 use super::grid_light::{ClearDepth, GridLight};
 use super::joint_cells::JointOdds;
-use super::soft_cells::{CellModel, Mixings, Sample, TileBlur, in_tile};
+use super::soft_cells::{CellModel, Mixings, Sample, in_tile};
 use super::tile_map::TileMap;
 use crate::grid::saddle_grid::SaddleGrid;
 use deltille_core::family::Family;
@@ -244,10 +244,8 @@ impl TagReader {
             let by = BESIDE * axis;
             (at(by) - at(-by)) / (2.0 * BESIDE * width)
         });
-        let (covariance, area_px2) = in_tile(light.blur_px2, along)?;
-        let noise = light.noise;
-        let mixing =
-            self.model.mixing(TileBlur { covariance, area_px2, noise }, &mut known.mixings)?;
+        let blur = in_tile(&light.blur, along, light.noise)?;
+        let mixing = self.model.mixing(blur, &mut known.mixings)?;
         let (right, lower) = (image.width() as f64 - 1.0, image.height() as f64 - 1.0);
         // Cells of the colour around the border are 1: the dark ones on inverted boards.
         let inverted = tile.is_dark() != (self.tags_in == TagsIn::Black);

@@ -235,13 +235,10 @@ impl SweptDeltille {
     /// respect to the motion.
     #[inline(always)]
     fn edge(&self, k: usize, h: f32) -> [f32; 3] {
-        let [ahead, behind] = [h + self.reach[k], h - self.reach[k]];
-        let [e1, e2] = [erf_sqrt_half(ahead), erf_sqrt_half(behind)];
-        // The integral of erf(h/√2).
-        let area = ahead * e1 - behind * e2 + SLOPE * (bell(ahead) - bell(behind));
-        let f = area * self.over_whole[k];
-        let by_way = ((e1 + e2) - 2.0 * f) * self.over_whole[k] * self.signs[k];
-        [f, (e1 - e2) * self.over_whole[k], by_way]
+        let over_whole = self.over_whole[k];
+        let Swept { f, e1, e2 } = swept(h, self.reach[k], over_whole);
+        let by_way = ((e1 + e2) - 2.0 * f) * over_whole * self.signs[k];
+        [f, (e1 - e2) * over_whole, by_way]
     }
 }
 
@@ -403,6 +400,29 @@ impl<const NODES: usize> Orthant<NODES> {
             ..both
         }
     }
+}
+
+/// The brightness of an edge in motion, and erf(h/√2) at both ends of the motion.
+struct Swept {
+    f: f32,
+    e1: f32,
+    e2: f32,
+}
+
+/// Returns the mean of erf(h/√2) over `reach` on each side; `over_whole` is 0.5/`reach`.
+#[inline(always)]
+fn swept(h: f32, reach: f32, over_whole: f32) -> Swept {
+    let [ahead, behind] = [h + reach, h - reach];
+    let [e1, e2] = [erf_sqrt_half(ahead), erf_sqrt_half(behind)];
+    // The integral of erf(h/√2).
+    let area = ahead * e1 - behind * e2 + SLOPE * (bell(ahead) - bell(behind));
+    Swept { f: area * over_whole, e1, e2 }
+}
+
+/// Returns the mean of erf(h/√2) over `reach` on each side.
+pub(crate) fn swept_edge(h: f32, reach: f32) -> f32 {
+    let reach = reach.abs();
+    if reach < MIN_WAY { erf_sqrt_half(h) } else { swept(h, reach, 0.5 / reach).f }
 }
 
 /// Returns the slope of an edge, ∂ erf(h/√2)/∂h.
