@@ -281,10 +281,18 @@ pub(crate) fn surroundings_of(
     corners.map(|i| around(&grid.corners[i]).unwrap_or_default()).collect()
 }
 
-/// Returns the intersection of the lines through the neighbours of a corner, px, if the corner is
-/// displaced from them. Returns `None` if lens distortion explains the displacement, or if there
-/// are fewer than two lines.
-pub(crate) fn crossing(grid: &Grid, corner: &GridCorner) -> Option<DVec2> {
+/// Intersection of the lines through the neighbours of a corner.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Crossing {
+    /// Its position, px.
+    pub(crate) position: DVec2,
+    /// Whether the corner is farther from it than lens distortion explains.
+    pub(crate) is_far: bool,
+}
+
+/// Returns the intersection of the lines through the neighbours of a corner. Returns `None` if there are fewer than two
+/// lines.
+pub(crate) fn crossing(grid: &Grid, corner: &GridCorner) -> Option<Crossing> {
     let places = Places::of(grid, 1.0);
     let vertex = Vertex::new(corner.row, corner.col);
     let here = corner.position();
@@ -303,8 +311,9 @@ pub(crate) fn crossing(grid: &Grid, corner: &GridCorner) -> Option<DVec2> {
         right -= c * n;
         lines += 1;
     }
-    let crossing = (lines > 1).then(|| normal.inverse() * right)?;
-    (here.distance(crossing) > MAX_SAG * nearest_px).then_some(crossing)
+    let position = (lines > 1).then(|| normal.inverse() * right)?;
+    let is_far = here.distance(position) > MAX_SAG * nearest_px;
+    Some(Crossing { position, is_far })
 }
 
 /// Positions of corners in the rectangle of rows and columns that they span.
@@ -516,10 +525,12 @@ mod tests {
                 assert!(around.edges.iter().all(|edge| edge.bend.abs() < 1e-9));
             }
             for corner in &grid.corners {
-                assert_eq!(crossing(&grid, corner), None);
                 let mistaken = GridCorner { x: corner.x + 4.0, y: corner.y - 6.0, ..*corner };
-                let found = crossing(&grid, &mistaken).unwrap();
-                assert!(found.distance(corner.position()) < 1e-9);
+                for (near, is_far) in [(*corner, false), (mistaken, true)] {
+                    let found = crossing(&grid, &near).unwrap();
+                    assert!(found.position.distance(corner.position()) < 1e-9);
+                    assert_eq!(found.is_far, is_far);
+                }
             }
         }
     }

@@ -168,7 +168,7 @@ impl Refiner {
         let mut around = surroundings(grid, tags, 1.0);
         let mut refined = self.refine_each(image, grid, &around, sharpness);
         let displaced = self.put_back(grid, &refined);
-        if displaced.contains(&true) {
+        if refined.iter().any(|(_, fit)| fit.is_none()) {
             around = surroundings(grid, tags, 1.0);
             refined = self.refine_each(image, grid, &around, sharpness);
         }
@@ -291,21 +291,28 @@ impl Refiner {
     }
 
     /// Moves corners at which the model fails, although it fits most others, to the intersection of
-    /// the lines through their neighbours. This is done only if the intersection is outside the
-    /// range of the model, because then a cell of a tag was mistaken for the corner. Returns which
-    /// corners were moved.
+    /// the lines through their neighbours: a cell of a tag may have been mistaken for the corner. Returns which
+    /// corners were moved farther than lens distortion explains, and out of the range of the model.
     fn put_back(&self, grid: &mut Grid, refined: &[(Refined, Option<ModelFit>)]) -> Vec<bool> {
-        let judged = is_judge(refined);
-        let place = |(corner, (_, fit)): (&GridCorner, &(_, Option<ModelFit>))| {
-            let lost = judged && fit.is_none();
-            let place = lost.then(|| crossing(grid, corner)).flatten()?;
-            (place.distance(corner.position()) > MAX_WAY_PX).then_some(place)
-        };
-        let places: Vec<_> = grid.corners.iter().zip(refined).map(place).collect();
-        for (corner, place) in grid.corners.iter_mut().zip(&places) {
-            corner.move_to(place.unwrap_or(corner.position()));
+        let mut displaced = vec![false; refined.len()];
+        if !is_judge(refined) {
+            return displaced;
         }
-        places.iter().map(Option::is_some).collect()
+        let mut fitted = grid.clone();
+        let mut fits = refined.iter().map(|(_, fit)| fit.as_ref());
+        fitted.corners.retain_mut(|corner| {
+            let fit = fits.next().flatten();
+            fit.inspect(|fit| corner.move_to(fit.position())).is_some()
+        });
+        for (i, corner) in grid.corners.iter_mut().enumerate() {
+            if refined[i].1.is_none()
+                && let Some(met) = crossing(&fitted, corner)
+            {
+                displaced[i] = met.is_far && met.position.distance(corner.position()) > MAX_WAY_PX;
+                corner.move_to(met.position);
+            }
+        }
+        displaced
     }
 
     /// Returns all of the clear area around a corner, in the largest window.
