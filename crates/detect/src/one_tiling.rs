@@ -1,5 +1,6 @@
 //! The stages of detection for the targets of one tiling.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -10,10 +11,12 @@ use crate::corners::ring;
 use crate::corners::saddles::{Saddle, SaddleFinder, too_many};
 use crate::grid::grids::grids;
 use crate::grid::links::link::has_chain;
-use crate::grid::saddle_grid::SaddleGrid;
+use crate::grid::saddle_grid::{PlacedSaddle, SaddleGrid};
 use crate::grid::untagged::beyond::go_on;
 use crate::grid::untagged::tile_shape::{LARGE_INK, is_of_squares};
+use crate::labels::grid_blur::GridBlur;
 use crate::labels::grid_labels::{FoundGrid, Labels, MAX_CORNERS, report_once};
+use crate::labels::grid_light::{ClearDepth, GridLight};
 use crate::labels::placement::labeller::Budget;
 use crate::refine::clearance::{TagAreas, surroundings};
 use crate::refine::edge_shift::{has_straight_edges, large_shift};
@@ -28,9 +31,9 @@ use crate::transformed::foreshortened::{
 use crate::transformed::moved_edges::grids_of_moved_edges;
 use deltille_core::Clock;
 use deltille_core::detection::{
-    Detection, Grid, Ink, InkEstimate, MIN_UNTAGGED_EDGE_PX, Reason, ReasonKind,
+    Detection, Grid, GridCorner, Ink, InkEstimate, MIN_UNTAGGED_EDGE_PX, Reason, ReasonKind,
 };
-use deltille_core::lattice::GridKind;
+use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::raster::{ImageView, Pyramid};
 use deltille_core::statistics::median;
 use deltille_core::targets::least_untagged_corners;
@@ -61,6 +64,9 @@ const POLYNOMIAL_RADIUS: usize = 3;
 
 /// Micrometres per millimetre.
 const UM_IN_MM: f64 = 1e3;
+
+/// Blur above which motion is estimated before corners are fitted, px. Fits without motion converge below it.
+const MIN_MOTION_BLUR_PX: f64 = 1.5;
 
 /// Largest radius of the model refinement, px. Beyond it, the curvature of edges by lens distortion
 /// costs more accuracy than a wider window gains.
@@ -493,13 +499,19 @@ impl OneTiling {
     ) -> (Optics, Vec<bool>) {
         let levels = frame.pyramid.levels();
         let finest = Level { image: frame.image, enlarged: 0, coarser: &levels[1..] };
-        let shift = large_shift(frame.image, grids).filter(|_| self.refiner.is_ink_open());
-        let refiner = match shift {
-            Some(shift) => &self.refiner.with_ink_near(shift.edges),
-            None => &self.refiner,
-        };
-        let least = shift.map_or(0, |shift| shift.level(levels.len()));
-        let blurs = refiner.blurs(fitter, finest, grids, &self.tag_areas);
+        let mut blurs = self.refiner.blurs(fitter, finest, grids, &self.tag_areas);
+        let motion = self.motion(frame.image, grids, &blurs);
+        let shift = || large_shift(frame.image, grids).filter(|_| self.refiner.is_ink_open());
+        let (mut refiner, mut least) = (Cow::Borrowed(&self.refiner), 0);
+        if let Some(motion) = motion {
+            refiner = Cow::Owned(self.refiner.with_motion_near(motion.astigmatism()));
+        } else if let Some(shift) = shift() {
+            refiner = Cow::Owned(self.refiner.with_ink_near(shift.edges));
+            least = shift.level(levels.len());
+        }
+        if matches!(refiner, Cow::Owned(_)) {
+            blurs = refiner.blurs(fitter, finest, grids, &self.tag_areas);
+        }
         let sharp = sharp_level(&blurs, levels.len());
         for number in (least.max(1)..=sharp.max(least)).rev() {
             // On a level that is coarser than its sharpness requires, edges would be sharper than the pixels.
@@ -513,15 +525,31 @@ impl OneTiling {
             let optics = refiner.optics(fitter, level, grids, &blurs, &self.tag_areas);
             // Motion blur leaves an image sharp perpendicular to the motion.
             let found = (number == least || is_sampled(&blurs, optics.narrowest()))
-                .then(|| self.refine_under(refiner, fitter, image, grids, &optics, &blurs));
+                .then(|| self.refine_under(&refiner, fitter, image, grids, &optics, &blurs));
             grids.iter_mut().for_each(|grid| grid.moved_from_level(number));
             if let Some(are_waves) = found {
                 return (optics, are_waves);
             }
         }
         let optics = refiner.optics(fitter, finest, grids, &blurs, &self.tag_areas);
-        let are_waves = self.refine_under(refiner, fitter, frame.image, grids, &optics, &blurs);
+        let are_waves = self.refine_under(&refiner, fitter, frame.image, grids, &optics, &blurs);
         (optics, are_waves)
+    }
+
+    /// Returns the blur of the largest grid of which an edge shows motion, if grids with these blurs, px, may show any.
+    fn motion(&self, image: ImageView, grids: &[Grid], blurs: &[Option<f64>]) -> Option<GridBlur> {
+        let may_move = |blur: &Option<f64>| blur.is_none_or(|blur_px| blur_px > MIN_MOTION_BLUR_PX);
+        let blurred = grids.iter().zip(blurs).filter(|(_, blur)| may_move(blur));
+        let (grid, _) = blurred.max_by_key(|(grid, _)| grid.corners.len())?;
+        let placed = |corner: &GridCorner| {
+            let position = corner.position();
+            (Vertex::new(corner.row, corner.col), PlacedSaddle { position, amplitude: 0.0 })
+        };
+        let corners = grid.corners.iter().map(placed).collect();
+        let [dark, bright] = self.tag_areas.insets(grid);
+        let clear = ClearDepth::within(dark, bright);
+        let light = GridLight::of(image, &corners, grid.kind, clear)?;
+        light.blur.is_motion().then_some(light.blur)
     }
 
     /// Refines the grids in an image with these optics and blurs, px; see [`Self::refine`].

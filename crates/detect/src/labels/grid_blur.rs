@@ -123,6 +123,11 @@ impl GridBlur {
         Some((blur(best), least))
     }
 
+    /// Returns whether a part of the blur is motion.
+    pub(crate) fn is_motion(&self) -> bool {
+        self.way_px != DVec2::ZERO
+    }
+
     /// Returns the blur across an edge with this normal.
     pub(crate) fn across(&self, normal: DVec2) -> EdgeBlur {
         let [a, b, c] = row(normal, normal);
@@ -131,10 +136,23 @@ impl GridBlur {
         EdgeBlur { sigma_px: variance.max(0.0).sqrt(), way_px: self.way_px.dot(normal) }
     }
 
+    /// Returns the covariance xx, xy, yy with that of the motion, px².
+    fn whole_px2(&self) -> [f64; 3] {
+        let DVec2 { x, y } = self.way_px;
+        let [xx, xy, yy] = self.covariance_px2;
+        [xx + x * x / 3.0, xy + x * y / 3.0, yy + y * y / 3.0]
+    }
+
     /// Returns the standard deviation, px, averaged over all directions.
     pub(crate) fn mean_px(&self) -> f64 {
-        let [xx, _, yy] = self.covariance_px2;
-        (0.5 * (xx + yy + self.way_px.length_squared() / 3.0)).sqrt()
+        let [xx, _, yy] = self.whole_px2();
+        (0.5 * (xx + yy)).sqrt()
+    }
+
+    /// Returns e₁ and e₂, by which the covariance is the mean variance times (1 + e₁, e₂; e₂, 1 − e₁).
+    pub(crate) fn astigmatism(&self) -> [f64; 2] {
+        let [xx, xy, yy] = self.whole_px2();
+        [(xx - yy) / (xx + yy), 2.0 * xy / (xx + yy)]
     }
 }
 

@@ -89,6 +89,12 @@ const STRONG_PRIOR: f64 = 1e6;
 /// The same where samples do determine the curvature: a tenth of a sample.
 const WEAK_PRIOR: f64 = 0.1;
 
+/// Depth from the edge at which untagged tiles, bright and dark, are sampled, in tile coordinates.
+const PLAIN_DEPTH: f64 = 0.2;
+
+/// Minimum depth if a tag leaves less room.
+const MIN_DEPTH: f64 = 0.06;
+
 /// Distance from the edges up to which tiles are plain, in tile coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ClearDepth {
@@ -96,6 +102,15 @@ pub(crate) struct ClearDepth {
     pub dark: f64,
     /// In bright tiles.
     pub bright: f64,
+}
+
+impl ClearDepth {
+    /// Returns the depth in tiles, dark and bright, whose tags begin at these distances from their edges, in tile
+    /// coordinates; infinite without tags.
+    pub(crate) fn within(dark: f64, bright: f64) -> Self {
+        let depth = |inset: f64| inset.clamp(MIN_DEPTH, PLAIN_DEPTH);
+        Self { dark: depth(dark), bright: depth(bright) }
+    }
 }
 
 /// Light and blur of a grid.

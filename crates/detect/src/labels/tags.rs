@@ -29,12 +29,6 @@ const GLARE_NOISE: f64 = 3.0;
 /// Fraction of full scale from which a pixel may be saturated.
 const SATURATED: f64 = 0.985;
 
-/// Depth from the edge at which untagged tiles, bright and dark, are sampled, in tile coordinates.
-const PLAIN_DEPTH: f64 = 0.2;
-
-/// Minimum depth if a tag leaves less room.
-const MIN_DEPTH: f64 = 0.06;
-
 /// Half the interval over which the map of a tile is differentiated, in tile coordinates. It stays inside the tile,
 /// because the centre of a triangle is at a third.
 const BESIDE: f64 = 0.25;
@@ -143,10 +137,9 @@ impl TagReader {
         let cells = family.cells();
         let inset_bits = margin_bits + border_bits;
         let width = cells.width(inset_bits);
-        let depth = |bits: f64| (bits / width).clamp(MIN_DEPTH, PLAIN_DEPTH);
         let clear = match tags_in {
-            TagsIn::Black => ClearDepth { dark: depth(border_bits), bright: PLAIN_DEPTH },
-            TagsIn::White => ClearDepth { dark: PLAIN_DEPTH, bright: depth(margin_bits) },
+            TagsIn::Black => ClearDepth::within(border_bits / width, f64::INFINITY),
+            TagsIn::White => ClearDepth::within(f64::INFINITY, margin_bits / width),
         };
         let model = CellModel::new(&cells, inset_bits, margin_bits);
         Self {

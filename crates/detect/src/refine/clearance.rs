@@ -102,6 +102,20 @@ impl TagAreas {
         panels.all(|panel| panel.leave_corners_clear)
     }
 
+    /// Returns the distances from the edges of dark and bright tiles to their tags, in edge lengths; infinite without
+    /// tags.
+    pub(crate) fn insets(&self, grid: &Grid) -> [f64; 2] {
+        let panels = self.targets.iter().flat_map(|(_, panels)| panels);
+        let of_grid = panels.filter(|(id, _)| grid.panel.is_none_or(|panel| panel == **id));
+        let mut insets = [f64::INFINITY; 2];
+        for (_, tags) in of_grid {
+            let in_bright = tags.tiles.first().is_some_and(|tile| !tile.is_dark());
+            let inset = &mut insets[usize::from(in_bright)];
+            *inset = inset.min(tags.insets.tag);
+        }
+        insets
+    }
+
     /// Returns the area of the tag that a tile of a grid may show: as on its panel, or in any suitable tile the largest
     /// one if the panel is unknown.
     fn of_tile(&self, grid: &Grid, tile: Tile) -> Option<Insets> {

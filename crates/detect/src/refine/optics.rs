@@ -158,6 +158,12 @@ impl Optics {
         Self { ink: ink / INK_UNIT, ..self }
     }
 
+    /// Returns these optics with a first estimate of the astigmatism of an image with motion.
+    pub(crate) fn with_motion_near(self, [e1, e2]: [f64; 2]) -> Self {
+        let long = (e1.hypot(e2) / MAX_ASTIGMATISM).max(1.0);
+        Self { astigmatism: [e1 / long, e2 / long], is_motion: true, ..self }
+    }
+
     /// Returns the ink spread, in edges.
     pub(crate) fn ink(&self) -> f64 {
         INK_UNIT * self.ink

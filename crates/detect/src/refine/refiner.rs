@@ -255,6 +255,12 @@ impl Refiner {
         Self { known: self.known.clone().with_ink_near(ink), ..self.clone() }
     }
 
+    /// Returns this refiner for an image with motion whose astigmatism is near this value.
+    pub(crate) fn with_motion_near(&self, astigmatism: [f64; 2]) -> Self {
+        let known = self.known.clone().with_motion_near(astigmatism);
+        Self { known, ..self.clone() }
+    }
+
     /// Returns whether the ink spread is unknown.
     pub(crate) fn is_ink_open(&self) -> bool {
         self.known.is_ink_open()
