@@ -28,10 +28,6 @@ use deltille_core::targets::{Panel, TagsIn, Target};
 /// % of its contrast.
 const BLUR_MARGIN_SIGMAS: f64 = 2.0;
 
-/// Maximum distance of a corner from the chord of its neighbours, relative to the distance to them. Lenses bend an edge
-/// by less than 0.3 rad from one corner to the next.
-const MAX_SAG: f64 = 0.15;
-
 /// Minimum determinant of the second moments of displacements, in mean spacings, that are not collinear: with gaps of a
 /// tenth of a tag, two have 0.18² · 0.18²; collinear ones have zero.
 const MIN_SPREAD: f64 = 1e-4;
@@ -295,39 +291,28 @@ pub(crate) fn surroundings_of(
     corners.map(|i| around(&grid.corners[i]).unwrap_or_default()).collect()
 }
 
-/// Intersection of the lines through the neighbours of a corner.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Crossing {
-    /// Its position, px.
-    pub(crate) position: DVec2,
-    /// Whether the corner is farther from it than lens distortion explains.
-    pub(crate) is_far: bool,
+/// Predicts corners from those of a grid.
+pub(crate) struct Prediction {
+    kind: GridKind,
+    places: Places,
+    shape: Shape,
 }
 
-/// Returns the intersection of the lines through the neighbours of a corner. Returns `None` if there are fewer than two
-/// lines.
-pub(crate) fn crossing(grid: &Grid, corner: &GridCorner) -> Option<Crossing> {
-    let places = Places::of(grid, 1.0);
-    let vertex = Vertex::new(corner.row, corner.col);
-    let here = corner.position();
-    let (mut normal, mut right, mut lines) = (DMat2::ZERO, DVec2::ZERO, 0);
-    let mut nearest_px = f64::INFINITY;
-    let steps = grid.kind.steps();
-    for &s in &steps[..steps.len() / 2] {
-        let ends =
-            [(vertex + s, vertex - s), (vertex + s, vertex + s + s), (vertex - s, vertex - s - s)];
-        let ends = ends.into_iter().find_map(|(a, b)| Some((places.get(a)?, places.get(b)?)));
-        let Some((a, b)) = ends else { continue };
-        nearest_px = nearest_px.min(here.distance(a)).min(here.distance(b));
-        let [a, b, c] = line(a, b, DVec2::ZERO);
-        let n = DVec2::new(a, b);
-        normal += DMat2::from_cols(n.x * n, n.y * n);
-        right -= c * n;
-        lines += 1;
+impl Prediction {
+    /// Creates the prediction from the corners of `grid`.
+    pub(crate) fn from(grid: &Grid) -> Self {
+        let places = Places::of(grid, 1.0);
+        Self { kind: grid.kind, shape: places.shape(grid), places }
     }
-    let position = (lines > 1).then(|| normal.inverse() * right)?;
-    let is_far = here.distance(position) > MAX_SAG * nearest_px;
-    Some(Crossing { position, is_far })
+
+    /// Returns the position of the corner at `vertex`, and its standard deviation, px. The corner itself must not be in
+    /// the grid.
+    pub(crate) fn at(&self, vertex: Vertex) -> Option<(DVec2, f64)> {
+        let map = self.places.map_about(self.kind, vertex, self.shape)?;
+        let steps = self.kind.steps();
+        let edge_px = steps.iter().map(|&step| map.along(step).length()).sum::<f64>();
+        Some((map.place, map.sigma * edge_px / steps.len() as f64))
+    }
 }
 
 /// Positions of corners in the rectangle of rows and columns that they span.
@@ -528,7 +513,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_cross_in_the_corner_under_perspective_and_are_not_bent() {
+    fn corners_are_predicted_and_not_bent_under_perspective() {
         let image = |DVec2 { x, y }: DVec2| {
             let depth = 1.0 + 0.1 * x - 0.05 * y;
             DVec2::new(300.0 + 30.0 * (x - 0.2 * y) / depth, 200.0 - 25.0 * y / depth)
@@ -539,12 +524,12 @@ mod tests {
                 assert!(around.edges.iter().all(|edge| edge.bend.abs() < 1e-9));
             }
             for corner in &grid.corners {
-                let mistaken = GridCorner { x: corner.x + 4.0, y: corner.y - 6.0, ..*corner };
-                for (near, is_far) in [(*corner, false), (mistaken, true)] {
-                    let found = crossing(&grid, &near).unwrap();
-                    assert!(found.position.distance(corner.position()) < 1e-9);
-                    assert_eq!(found.is_far, is_far);
-                }
+                let mut others = grid.clone();
+                others.corners.retain(|other| other != corner);
+                let vertex = Vertex::new(corner.row, corner.col);
+                let (position, sd_px) = Prediction::from(&others).at(vertex).unwrap();
+                let off_px = position.distance(corner.position());
+                assert!(off_px < 3.0 * sd_px && sd_px < 10.0, "{off_px} {sd_px}");
             }
         }
     }

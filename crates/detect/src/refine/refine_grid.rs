@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::clearance::{Surroundings, TagAreas, crossing, surroundings, surroundings_of};
+use super::clearance::{Prediction, Surroundings, TagAreas, surroundings, surroundings_of};
 use super::joint_fit::Sample;
 use super::model::fitter::{CornerFitter, MAX_WAY_PX};
 use super::model::window::Patch;
@@ -70,6 +70,10 @@ const MAX_BLUR_RATIO: f64 = 3.0;
 /// Maximum standard deviation of a position, px, including systematic residuals. Positions above it
 /// are dropped, because the grid predicts them equally well.
 const WORST_SIGMA_PX: f64 = 3.0;
+
+/// Distance of a corner from its prediction, in standard deviations in addition to the range of the model, from which it
+/// was mistaken.
+const MISTAKEN_SIGMAS: f64 = 3.0;
 
 /// Size ratio of successive windows.
 const NEXT_WINDOW: f64 = 0.7;
@@ -167,7 +171,7 @@ impl Refiner {
         let sharpness = Sharpness { blur_px: blur_px.unwrap_or(TYPICAL_BLUR_PX), optics };
         let mut around = surroundings(grid, tags, 1.0);
         let mut refined = self.refine_each(image, grid, &around, sharpness);
-        let displaced = self.put_back(grid, &refined);
+        let mistaken = self.put_back(grid, &refined);
         if refined.iter().any(|(_, fit)| fit.is_none()) {
             around = surroundings(grid, tags, 1.0);
             refined = self.refine_each(image, grid, &around, sharpness);
@@ -184,7 +188,7 @@ impl Refiner {
             let clean = fit.is_some_and(|fit| fit.residual <= limit);
             let modelled =
                 || self.method() == Refinement::Model && self.has_room(image, corner, room);
-            let (refined, fit) = if displaced[i] && fit.is_none() {
+            let (refined, fit) = if mistaken[i] && fit.is_none() {
                 (None, None)
             } else if clean || !judged || !modelled() {
                 (Some(refined), fit.filter(|_| clean))
@@ -290,13 +294,12 @@ impl Refiner {
         })
     }
 
-    /// Moves corners at which the model fails, although it fits most others, to the intersection of
-    /// the lines through their neighbours: a cell of a tag may have been mistaken for the corner. Returns which
-    /// corners were moved farther than lens distortion explains, and out of the range of the model.
+    /// Moves corners at which the model fails, although it fits most others, to the position that the others predict: a
+    /// cell of a tag may have been mistaken for the corner. Returns which corners were certainly mistaken.
     fn put_back(&self, grid: &mut Grid, refined: &[(Refined, Option<ModelFit>)]) -> Vec<bool> {
-        let mut displaced = vec![false; refined.len()];
-        if !is_judge(refined) {
-            return displaced;
+        let mut mistaken = vec![false; refined.len()];
+        if !is_judge(refined) || refined.iter().all(|(_, fit)| fit.is_some()) {
+            return mistaken;
         }
         let mut fitted = grid.clone();
         let mut fits = refined.iter().map(|(_, fit)| fit.as_ref());
@@ -304,15 +307,18 @@ impl Refiner {
             let fit = fits.next().flatten();
             fit.inspect(|fit| corner.move_to(fit.position())).is_some()
         });
+        let predicted = Prediction::from(&fitted);
         for (i, corner) in grid.corners.iter_mut().enumerate() {
             if refined[i].1.is_none()
-                && let Some(met) = crossing(&fitted, corner)
+                && let Some((position, sd_px)) = predicted.at(Vertex::new(corner.row, corner.col))
+                && sd_px < MAX_WAY_PX
             {
-                displaced[i] = met.is_far && met.position.distance(corner.position()) > MAX_WAY_PX;
-                corner.move_to(met.position);
+                let off_px = position.distance(corner.position());
+                mistaken[i] = off_px > MAX_WAY_PX + MISTAKEN_SIGMAS * sd_px;
+                corner.move_to(position);
             }
         }
-        displaced
+        mistaken
     }
 
     /// Returns all of the clear area around a corner, in the largest window.
