@@ -18,7 +18,7 @@ use crate::labels::grid_blur::GridBlur;
 use crate::labels::grid_labels::{FoundGrid, Labels, MAX_CORNERS, report_once};
 use crate::labels::grid_light::{ClearDepth, GridLight};
 use crate::labels::placement::labeller::Budget;
-use crate::refine::clearance::{TagAreas, surroundings};
+use crate::refine::clearance::{Margin, TagAreas, surroundings};
 use crate::refine::edge_shift::{has_straight_edges, large_shift};
 use crate::refine::model::fitter::CornerFitter;
 use crate::refine::optics::Optics;
@@ -332,7 +332,8 @@ impl OneTiling {
     fn may_lack_corners(&self, grids: &Judged) -> bool {
         let is_near = |grid: &Grid| {
             let around = surroundings(grid, &self.tag_areas, 1.0);
-            let clear = around.iter().map(|around| around.clear_square_px(0.0)).collect();
+            let clear =
+                around.iter().map(|around| around.clear_square_px(Margin::of(0.0))).collect();
             median(clear).is_some_and(|clear_px| clear_px < ring::RADIUS as f64)
         };
         let mut labelled = grids.iter().map(|(grid, _)| grid).filter(|grid| is_labelled(grid));

@@ -133,6 +133,33 @@ pub(crate) const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 /// Signed distance from a line, px: a·u + b·v + c.
 type Line = [f64; 3];
 
+/// Distance from other edges at which a blur shows nothing of them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Margin {
+    /// In the mean over all directions, px.
+    px: f64,
+    /// e₁ and e₂ of the squared blur.
+    astigmatism: [f64; 2],
+}
+
+impl Margin {
+    /// Returns the margin of a blur of this standard deviation, px.
+    pub(crate) fn of(blur_px: f64) -> Self {
+        Self { px: BLUR_MARGIN_SIGMAS * blur_px, astigmatism: [0.0; 2] }
+    }
+
+    /// Returns this margin for a blur with this astigmatism.
+    pub(crate) fn with_astigmatism(self, astigmatism: [f64; 2]) -> Self {
+        Self { astigmatism, ..self }
+    }
+
+    /// Returns the margin from a line, px.
+    fn from(self, [a, b, _]: &Line) -> f64 {
+        let [e1, e2] = self.astigmatism;
+        self.px * (1.0 + e1 * (a * a - b * b) + 2.0 * e2 * a * b).sqrt()
+    }
+}
+
 /// The surroundings of a corner, in px relative to it.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Surroundings {
@@ -166,15 +193,14 @@ pub(crate) struct Edge {
 
 impl Surroundings {
     /// Returns the ends of the clear part of a row at distance `v` from the corner, px. It lies between the far sides
-    /// of the tiles under a blur of this standard deviation, px.
-    pub(crate) fn span(&self, v: f64, blur_px: f64) -> [f64; 2] {
+    /// of the tiles.
+    pub(crate) fn span(&self, v: f64, margin: Margin) -> [f64; 2] {
         if self.sides.is_empty() {
             return NOTHING;
         }
-        let margin = BLUR_MARGIN_SIGMAS * blur_px;
         let [mut first, mut last] = [f64::NEG_INFINITY, f64::INFINITY];
-        for [a, b, c] in &self.sides {
-            let rest = margin - b * v - c;
+        for side @ [a, b, c] in &self.sides {
+            let rest = margin.from(side) - b * v - c;
             if *a > 0.0 {
                 first = first.max(rest / a);
             } else if *a < 0.0 {
@@ -186,33 +212,25 @@ impl Surroundings {
         [first, last]
     }
 
-    /// Returns a predicate for positions, px from the corner: whether no tag is visible there under a blur of this
-    /// standard deviation, px; or only its border, if `with_borders`.
-    pub(crate) fn off_tags(&self, blur_px: f64, with_borders: bool) -> impl Fn(DVec2) -> bool {
-        let margin = BLUR_MARGIN_SIGMAS * blur_px;
+    /// Returns a predicate for positions, px from the corner: whether no tag is visible there with this margin; or only
+    /// its border, if `with_borders`.
+    pub(crate) fn off_tags(&self, margin: Margin, with_borders: bool) -> impl Fn(DVec2) -> bool {
         let areas = if with_borders { &self.cells } else { &self.tags };
-        let circle2 = (distance_of(areas, DVec2::ZERO) - margin).max(0.0).powi(2);
-        move |place| place.length_squared() < circle2 || distance_of(areas, place) >= margin
+        let circle2 = clear_of(areas, DVec2::ZERO, margin).max(0.0).powi(2);
+        move |place| place.length_squared() < circle2 || clear_of(areas, place, margin) >= 0.0
     }
 
-    /// Returns half the side of the largest clear square around the corner, px, under a blur of this standard
-    /// deviation, px.
-    pub(crate) fn clear_square_px(&self, blur_px: f64) -> f64 {
-        let clear = self.distance(DVec2::ZERO) - BLUR_MARGIN_SIGMAS * blur_px;
+    /// Returns half the side of the largest clear square around the corner, px, with this margin.
+    pub(crate) fn clear_square_px(&self, margin: Margin) -> f64 {
+        let nearest = self.sides.iter().map(|side| side[2] - margin.from(side)).reduce(f64::min);
+        let clear = nearest.unwrap_or(0.0).min(clear_of(&self.tags, DVec2::ZERO, margin));
         clear.max(0.0) * std::f64::consts::FRAC_1_SQRT_2
-    }
-
-    /// Returns a lower bound of the distance from a point to the nearest object other than the corner, px.
-    fn distance(&self, place: DVec2) -> f64 {
-        let sides = self.sides.iter().map(|[a, b, c]| a * place.x + b * place.y + c);
-        let nearest = sides.reduce(f64::min).unwrap_or(0.0);
-        nearest.min(distance_of(&self.tags, place))
     }
 }
 
-/// Returns a lower bound of the distance from a point to the nearest of some areas, px.
-fn distance_of(areas: &[Vec<Line>], DVec2 { x: u, y: v }: DVec2) -> f64 {
-    let from = |[a, b, c]: &Line| a * u + b * v + c;
+/// Returns a lower bound of the distance from a point to the nearest of some areas with this margin, px.
+fn clear_of(areas: &[Vec<Line>], DVec2 { x: u, y: v }: DVec2, margin: Margin) -> f64 {
+    let from = |side: &Line| side[0] * u + side[1] * v + side[2] - margin.from(side);
     let outside = |area: &Vec<Line>| area.iter().map(from).fold(f64::NEG_INFINITY, f64::max);
     areas.iter().map(outside).fold(f64::INFINITY, f64::min)
 }
@@ -559,15 +577,15 @@ mod tests {
         let tags = TagAreas { targets: vec![(None, BTreeMap::from([(0, panel)]))] };
         let around = &surroundings(&grid, &tags, 1.0)[12];
         // Cells begin 10 px from both edges; the blur reaches 2 px.
-        let off_tags = around.off_tags(1.0, false);
+        let off_tags = around.off_tags(Margin::of(1.0), false);
         let clear = |u: f64, v: f64| {
-            let [first, last] = around.span(v, 1.0);
+            let [first, last] = around.span(v, Margin::of(1.0));
             (first..=last).contains(&u) && off_tags(DVec2::new(u, v))
         };
         assert!(clear(7.0, 7.0) && clear(35.0, 6.0) && clear(-6.0, 35.0));
         assert!(!clear(12.0, 12.0) && !clear(9.0, 20.0) && !clear(39.0, 0.0));
         let square_px = (10.0 - 2.0) * std::f64::consts::FRAC_1_SQRT_2;
-        assert!((around.clear_square_px(1.0) - square_px).abs() < 1e-9);
+        assert!((around.clear_square_px(Margin::of(1.0)) - square_px).abs() < 1e-9);
     }
 
     #[test]

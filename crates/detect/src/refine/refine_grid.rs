@@ -127,7 +127,8 @@ impl Refiner {
             };
             let sampled = (0..grid.corners.len()).step_by(every);
             for (i, around) in sampled.clone().zip(surroundings_of(grid, tags, 1.0, sampled)) {
-                let (order, clear_px) = (places.len(), around.clear_square_px(blur_px));
+                let margin = Sharpness { blur_px, optics: &self.known }.margin();
+                let (order, clear_px) = (places.len(), around.clear_square_px(margin));
                 places.push((order, clear_px, blur_px, grid.corners[i], around));
             }
         }
@@ -237,7 +238,7 @@ impl Refiner {
         let mut around = surroundings(grid, tags, 1.0);
         let mut fits = again(&around, fits);
         let may_show_borders = |around: &Surroundings| {
-            let clear_px = around.clear_square_px(sharpness.blur_px);
+            let clear_px = around.clear_square_px(sharpness.margin());
             !around.borders.is_empty() && clear_px < MIN_MODEL_RADIUS as f64
         };
         if around.iter().any(may_show_borders) {
@@ -370,9 +371,10 @@ impl Refiner {
         let every = grid.corners.len().div_ceil(OVERSAMPLING * BLUR_CORNERS).max(1);
         let sampled = (0..grid.corners.len()).step_by(every);
         let around = surroundings_of(grid, tags, scale, sampled.clone()).into_iter();
+        let typical = Sharpness { blur_px: TYPICAL_BLUR_PX, optics: &self.known }.margin();
         let mut places: Vec<(f64, GridCorner, Surroundings)> = sampled
             .zip(around)
-            .map(|(i, around)| (around.clear_square_px(TYPICAL_BLUR_PX), grid.corners[i], around))
+            .map(|(i, around)| (around.clear_square_px(typical), grid.corners[i], around))
             .collect();
         places.sort_by(|a, b| b.0.total_cmp(&a.0));
         let fits = places.iter().take(BLUR_CORNERS).filter_map(|(clear_px, corner, around)| {

@@ -20,7 +20,7 @@ use std::borrow::Cow;
 
 use glam::DVec2;
 
-use super::clearance::{Edge, NOTHING, Surroundings};
+use super::clearance::{Edge, Margin, NOTHING, Surroundings};
 use super::corner_start::{start, start_along};
 use super::joint_fit::Sample;
 use super::model::corner::Corner;
@@ -137,6 +137,17 @@ pub(crate) struct Sharpness<'a> {
     pub optics: &'a Optics,
 }
 
+impl Sharpness<'_> {
+    /// Returns the margin of a corner from other edges. Without motion, the blur is nearly the same in all directions.
+    pub(crate) fn margin(&self) -> Margin {
+        let margin = Margin::of(self.blur_px);
+        match self.optics.is_motion {
+            true => margin.with_astigmatism(self.optics.astigmatism),
+            false => margin,
+        }
+    }
+}
+
 /// Clear area around a corner.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Room<'a> {
@@ -156,15 +167,16 @@ impl Room<'_> {
         let [right, bottom] = [image.width(), image.height()].map(|side| side as f64 - 1.0);
         let pixel = position.round();
         let off = pixel - position;
+        let margin = self.margin();
         let span = |v: f64| {
             if !(0.0..=bottom).contains(&(pixel.y + v)) {
                 return NOTHING;
             }
-            let [first, last] = self.around.span(v + off.y, self.blur_px);
+            let [first, last] = self.around.span(v + off.y, margin);
             [(first - off.x).max(-pixel.x), (last - off.x).min(right - pixel.x)]
         };
         let within = |with_borders: bool| {
-            let is_off_tags = self.around.off_tags(self.blur_px, with_borders);
+            let is_off_tags = self.around.off_tags(margin, with_borders);
             Window::within(radius, span, |place| is_off_tags(place + off))
         };
         let (window, borders) = (within(false), &self.around.borders);
@@ -182,7 +194,11 @@ impl Room<'_> {
 
     /// Returns half the side of the largest clear square, px.
     pub(crate) fn clear_square_px(&self) -> f64 {
-        self.around.clear_square_px(self.blur_px).min(self.reach_px)
+        self.around.clear_square_px(self.margin()).min(self.reach_px)
+    }
+
+    fn margin(&self) -> Margin {
+        Sharpness { blur_px: self.blur_px, optics: self.optics }.margin()
     }
 }
 
