@@ -322,8 +322,21 @@ impl OneTiling {
             let reasons = reasons.chain(left_out.iter_mut().take(of_found));
             self.name_other_settings(image, &found, reasons);
         }
-        let (grids, optics) = self.refined::<N>(frame, grids);
+        let (mut grids, mut optics) = self.refined::<N>(frame, grids);
         timing.lap("refine");
+        if !self.tag_areas.is_empty()
+            && !grids.is_empty()
+            && !grids.iter().any(|(grid, _)| is_labelled(grid))
+        {
+            // Under strong blur, the tags displace the corners that are not yet refined.
+            let precise: Vec<SaddleGrid> =
+                grids.iter().filter_map(|grid| with_positions(&found, grid)).collect();
+            let again = self.plausible::<N>(frame, &precise, &mut Vec::new());
+            if again.iter().any(|(grid, _)| is_labelled(grid)) {
+                (grids, optics) = self.refined::<N>(frame, again);
+            }
+            timing.lap("labels");
+        }
         Found { grids, optics, left_out, saddles: saddles.len() }
     }
 
@@ -589,6 +602,20 @@ fn is_confirmed(grid: &Grid) -> bool {
 /// Returns whether a grid is confirmed by tags or as a whole board.
 fn is_labelled(grid: &Grid) -> bool {
     is_confirmed(grid) || grid.panel.is_some()
+}
+
+/// Returns one of the `found` grids, which was refined without labels, at its refined positions.
+fn with_positions(
+    found: &[SaddleGrid],
+    (grid, reason): &(Grid, Option<Reason>),
+) -> Option<SaddleGrid> {
+    let before = found.get(reason.as_ref()?.grid?)?;
+    let placed = |corner: &GridCorner| {
+        let vertex = Vertex::new(corner.row, corner.col);
+        let PlacedSaddle { amplitude, .. } = *before.get(&vertex)?;
+        Some((vertex, PlacedSaddle { position: corner.position(), amplitude }))
+    };
+    Some(grid.corners.iter().filter_map(placed).collect())
 }
 
 /// Sorts labelled grids by panel, then the others; a stable sort keeps the largest first.
