@@ -73,9 +73,9 @@ pub(crate) fn large_shift(image: ImageView, grids: &[Grid]) -> Option<EdgeShift>
 /// Returns whether the edges of an untagged grid are straight. Dots that touch diagonally look like squares that have
 /// grown or shrunk, but their outlines are round.
 pub(crate) fn has_straight_edges(image: ImageView, grid: &Grid) -> bool {
-    let bow = |edge: &[DVec2; 2]| {
+    let bow = |edge: &MeasuredEdge| {
         let [first, middle, last] =
-            [0.25, 0.5, 0.75].map(|part| shift_of_edge(image, *edge, part, grid.kind));
+            [0.25, 0.5, 0.75].map(|part| shift_of_edge(image, edge, part, grid.kind));
         Some(middle? - (first? + last?) / 2.0)
     };
     let bows: Vec<f64> = measured_edges(grid).iter().filter_map(bow).collect();
@@ -83,27 +83,44 @@ pub(crate) fn has_straight_edges(image: ImageView, grid: &Grid) -> bool {
     is_measured && median(bows).is_some_and(|bow| bow.abs() < MAX_BOW)
 }
 
-/// Returns edges of a grid from all over it, each from one corner to the next.
-fn measured_edges(grid: &Grid) -> Vec<[DVec2; 2]> {
+/// An edge of a tile.
+struct MeasuredEdge {
+    from: DVec2,
+    along: DVec2,
+    /// Image of the direction that is perpendicular to the edge on the print, as long as the edge there.
+    across: DVec2,
+}
+
+/// Returns edges of a grid from all over it.
+fn measured_edges(grid: &Grid) -> Vec<MeasuredEdge> {
     let corners: BTreeMap<Vertex, DVec2> = grid
         .corners
         .iter()
         .map(|corner| (Vertex::new(corner.row, corner.col), corner.position()))
         .collect();
     let steps = grid.kind.steps();
-    let half = &steps[..steps.len() / 2];
-    let edges: Vec<[DVec2; 2]> = corners
-        .iter()
-        .flat_map(|(&vertex, &from)| half.iter().map(move |&step| (vertex + step, from)))
-        .filter_map(|(next, from)| Some([from, *corners.get(&next)?]))
-        .collect();
+    let (half, quarter) = (steps.len() / 2, steps.len() / 4);
+    let edge = |(vertex, from, k): (Vertex, DVec2, usize)| {
+        let along = *corners.get(&(vertex + steps[k]))? - from;
+        // On either side: a corner of the same tile.
+        let beside = [k + quarter, k + steps.len() - quarter]
+            .map(|side| corners.get(&(vertex + steps[side % steps.len()])));
+        let beside = beside.into_iter().flatten().next()? - from;
+        let across = match grid.kind {
+            GridKind::Deltille => (beside - along / 2.0) / deltille_core::lattice::ROW_HEIGHT,
+            GridKind::Checker => beside,
+        };
+        Some(MeasuredEdge { from, along, across })
+    };
+    let all = corners.iter().flat_map(|(&vertex, &from)| (0..half).map(move |k| (vertex, from, k)));
+    let edges: Vec<MeasuredEdge> = all.filter_map(edge).collect();
     let every = edges.len().div_ceil(MAX_EDGES).max(1);
     edges.into_iter().step_by(every).collect()
 }
 
 fn shift_of_grid(image: ImageView, grid: &Grid) -> Option<EdgeShift> {
     let shifts: Vec<f64> = measured_edges(grid)
-        .into_iter()
+        .iter()
         .filter_map(|edge| shift_of_edge(image, edge, 0.5, grid.kind))
         .collect();
     let edge_px = grid.edge_px()?;
@@ -114,15 +131,9 @@ fn shift_of_grid(image: ImageView, grid: &Grid) -> Option<EdgeShift> {
 
 /// Returns the displacement of the step across an edge towards its bright side, as a fraction of the edge length.
 /// It is measured at a fraction `part` of the edge.
-fn shift_of_edge(
-    image: ImageView,
-    [from, to]: [DVec2; 2],
-    part: f64,
-    kind: GridKind,
-) -> Option<f64> {
-    let along = to - from;
+fn shift_of_edge(image: ImageView, edge: &MeasuredEdge, part: f64, kind: GridKind) -> Option<f64> {
+    let MeasuredEdge { from, along, across } = *edge;
     let middle = from + part * along;
-    let across = along.perp();
     let reach = match kind {
         GridKind::Deltille => MAX_SHIFT * deltille_core::lattice::ROW_HEIGHT,
         GridKind::Checker => MAX_SHIFT,

@@ -216,8 +216,7 @@ pub struct Refiner {
     tone: Tone,
     /// Optics known before any image.
     pub(crate) known: Optics,
-    /// Optics with a usual tone curve and without ink, whose first estimate may be wrong at grazing angles, for first fits
-    /// under an unknown curve.
+    /// Optics with a usual tone curve, for first fits under an unknown one.
     toned: Option<Optics>,
 }
 
@@ -268,7 +267,8 @@ impl Refiner {
 
     /// Returns this refiner for an image in which an unknown ink spread is near this value, in edges of a tile.
     pub(crate) fn with_ink_near(&self, ink: f64) -> Self {
-        Self { known: self.known.clone().with_ink_near(ink), ..self.clone() }
+        let near = |optics: &Optics| optics.clone().with_ink_near(ink);
+        Self { known: near(&self.known), toned: self.toned.as_ref().map(near), ..self.clone() }
     }
 
     /// Returns this refiner for an image with motion whose astigmatism is near this value.
