@@ -90,7 +90,7 @@ impl GridBlur {
 
     /// Returns the motion, and the Gaussian of all that remains, with the least `cost`. The search begins with the
     /// variances of this Gaussian blur. Returns `None` if these are nearly equal in all directions.
-    pub(crate) fn as_motion(&self, cost: impl Fn(&Self) -> f64) -> Option<(Self, f64)> {
+    pub(crate) fn as_motion(&self, cost: impl Fn(&Self) -> f64) -> Option<Self> {
         let [low, high, angle] = axes(self.covariance_px2);
         if high - low < MIN_STRETCH * (high + low) {
             return None;
@@ -120,7 +120,7 @@ impl GridBlur {
             }
             step /= 2.0;
         }
-        Some((blur(best), least))
+        Some(blur(best))
     }
 
     /// Returns whether a part of the blur is motion.
@@ -168,4 +168,43 @@ fn with_axes([low, high, angle]: [f64; 3]) -> [f64; 3] {
     let (middle, radius) = (0.5 * (high + low), 0.5 * (high - low));
     let (sin, cos) = (2.0 * angle).sin_cos();
     [middle + radius * cos, radius * sin, middle - radius * cos]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Variances across the edges of a lattice determine a Gaussian, and the shapes of their profiles a motion.
+    #[test]
+    fn profiles_of_three_edges_determine_a_motion() {
+        let normals = [0.1, 1.2, 2.3].map(DVec2::from_angle);
+        for (sigma_px, way_px) in [(0.8, DVec2::new(5.0, -4.0)), (1.5, DVec2::new(1.0, 6.0))] {
+            let variance = sigma_px * sigma_px;
+            let seen = GridBlur { covariance_px2: [variance, 0.0, variance], way_px };
+            let spread = |normal: DVec2| {
+                let EdgeBlur { sigma_px, way_px } = seen.across(normal);
+                Spread {
+                    row: row(normal, normal),
+                    value_px2: sigma_px * sigma_px + way_px * way_px / 3.0,
+                }
+            };
+            let gaussian = GridBlur::gaussian(&normals.map(spread), &[]);
+            let [a, b] = [gaussian.astigmatism(), seen.astigmatism()];
+            assert!((a[0] - b[0]).abs() < 0.05 && (a[1] - b[1]).abs() < 0.05, "{a:?} {b:?}");
+            let cost = |blur: &GridBlur| {
+                let error = |&normal: &DVec2| {
+                    let [found, seen] = [blur, &seen].map(|blur| blur.across(normal));
+                    (-20..=20).map(|d| (found.step(d.into()) - seen.step(d.into())).powi(2)).sum::<f64>()
+                };
+                normals.iter().map(error).sum::<f64>()
+            };
+            let motion = gaussian.as_motion(cost).unwrap();
+            let sign = motion.way_px.dot(way_px).signum();
+            assert!((sign * motion.way_px).distance(way_px) < 0.3, "{motion:?}");
+            assert!((motion.covariance_px2[0] - variance).abs() < 0.2 * variance, "{motion:?}");
+        }
+        let round =
+            GridBlur::gaussian(&normals.map(|n| Spread { row: row(n, n), value_px2: 1.0 }), &[]);
+        assert!(round.as_motion(|_| 0.0).is_none());
+    }
 }

@@ -210,7 +210,7 @@ impl GridLight {
             let fits = some.iter().map(|profile| (*profile, blur.across(profile.normal)));
             Fitted::of(fits, light.clipped_share).squares
         };
-        if let Some((motion, _)) = light.blur.as_motion(cost) {
+        if let Some(motion) = light.blur.as_motion(cost) {
             let swept = all().map(|profile| (profile, motion.across(profile.normal)));
             let swept = Fitted::of(swept, light.clipped_share);
             if swept.squares < fitted.squares {

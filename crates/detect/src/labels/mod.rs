@@ -2,7 +2,7 @@
 //!
 //! Input: the image and a grid. Output: the grid with panel, rows and columns, or the reason why it has no labels.
 //!
-//! 1. `grid_light` measures black, white and blur on the edges of the tiles.
+//! 1. `grid_light` measures black, white and blur (`grid_blur`) on the edges of the tiles.
 //! 2. `tags` samples every tile through its map (`tile_map`); `soft_cells` computes the log-odds of its cells, and
 //!    `joint_cells` those of words whose cells are blurred into each other.
 //! 3. `tag_words` compares them with the words of the target.
