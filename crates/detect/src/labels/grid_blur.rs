@@ -194,7 +194,9 @@ mod tests {
             let cost = |blur: &GridBlur| {
                 let error = |&normal: &DVec2| {
                     let [found, seen] = [blur, &seen].map(|blur| blur.across(normal));
-                    (-20..=20).map(|d| (found.step(d.into()) - seen.step(d.into())).powi(2)).sum::<f64>()
+                    (-20..=20)
+                        .map(|d| (found.step(d.into()) - seen.step(d.into())).powi(2))
+                        .sum::<f64>()
                 };
                 normals.iter().map(error).sum::<f64>()
             };

@@ -29,6 +29,8 @@ pub enum Axis {
     Glare,
     /// Sag of the bent sheet, % of the board's width.
     Curl,
+    /// Growth of dark areas on every side, % of an edge.
+    EdgeShift,
     /// Width to which the image is resized, px.
     Scale,
     /// Demosaicing method.
@@ -58,7 +60,7 @@ pub struct Level {
 
 impl Axis {
     /// All axes, in the order of the report.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 21] = [
         Self::Blur,
         Self::Motion,
         Self::Noise,
@@ -71,6 +73,7 @@ impl Axis {
         Self::Covers,
         Self::Glare,
         Self::Curl,
+        Self::EdgeShift,
         Self::Scale,
         Self::Mosaic,
         Self::ColourExposure,
@@ -96,6 +99,7 @@ impl Axis {
             Self::Covers => "covers",
             Self::Glare => "glare",
             Self::Curl => "curl",
+            Self::EdgeShift => "edge-shift",
             Self::Scale => "scale",
             Self::Mosaic => "mosaic",
             Self::ColourExposure => "colour-exposure",
@@ -122,6 +126,7 @@ impl Axis {
             Self::Covers => "covered, %",
             Self::Glare => "glare spots",
             Self::Curl => "sag of the sheet, % of the board width",
+            Self::EdgeShift => "growth of dark areas, % of an edge",
             Self::Scale => "image width after resizing, px",
             Self::Mosaic => "mosaic",
             Self::ColourExposure => "exposure gain, colour",
@@ -187,6 +192,11 @@ impl Axis {
             }
             Self::Glare => numbers(&[0.0, 1.0, 2.0, 3.0, 5.0], |s, v| s.glare = v as u32),
             Self::Curl => numbers(&[0.0, 1.0, 2.0, 4.0, 8.0, 12.0], |s, v| s.curl = v / 100.0),
+            Self::EdgeShift => {
+                numbers(&[-15.0, -10.0, -5.0, -2.0, 0.0, 2.0, 5.0, 10.0, 12.0], |s, v| {
+                    s.edge_shift = v / 100.0;
+                })
+            }
             Self::Scale => {
                 numbers(&[600.0, 960.0, 1600.0, 2400.0, 4000.0, 6000.0, 8000.0, 12000.0], |s, v| {
                     s.width_px = Some(v as u32)

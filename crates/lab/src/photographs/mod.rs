@@ -193,13 +193,16 @@ pub fn run(
     let mut rows = Vec::new();
     for &axis in setup.axes {
         for level in axis.levels() {
+            let shift = level.scene.edge_shift;
+            let moved = (shift != 0.0).then(|| subject.page.with_moved_edges(shift));
+            let page = moved.as_ref().unwrap_or(&subject.page);
             let scores: Result<Vec<Option<Score>>, PhotographError> = (0..setup.views)
                 .into_par_iter()
                 .map(|view| {
                     if cancel.load(Ordering::Relaxed) {
                         return Ok(None);
                     }
-                    let photograph = take(&subject.page, &studio, &level.scene, view);
+                    let photograph = take(page, &studio, &level.scene, view);
                     let score = judge(subject, setup, axis, &level, view, &photograph)?;
                     progress();
                     Ok(Some(score))

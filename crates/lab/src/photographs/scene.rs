@@ -13,6 +13,8 @@ pub struct Scene {
     pub tilt_deg: Option<f64>,
     /// Sag of the bent sheet over the width of the board, as a fraction of that width.
     pub curl: f64,
+    /// Growth of dark areas on every side, as a fraction of an edge.
+    pub edge_shift: f64,
     /// Surroundings of the page.
     pub background: Background,
     /// Fraction of the corners that lies under hands and other objects.
@@ -67,6 +69,7 @@ impl Default for Scene {
             bit_px: 4.0,
             tilt_deg: None,
             curl: 0.0,
+            edge_shift: 0.0,
             background: Background::Texture,
             covered: 0.0,
             white: 0.7,

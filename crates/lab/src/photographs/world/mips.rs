@@ -32,6 +32,11 @@ impl Mips {
         Self { levels, beyond }
     }
 
+    /// Returns the image at half its size.
+    pub(super) fn half(&self) -> &Gray<u8> {
+        &self.levels[1.min(self.levels.len() - 1)]
+    }
+
     /// Returns the mean over a parallelogram around a position, in pixels of the first level.
     ///
     /// The level is the first whose pixels are at least as large as the narrow side of the parallelogram. Samples

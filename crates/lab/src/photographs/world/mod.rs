@@ -7,10 +7,12 @@
 //! 2. `paths` extracts these positions from the operators of the PDF.
 //! 3. `background` is the table on which the page lies, and the texture of the covers.
 //! 4. `covers` are hands, cables and cups on the page.
-//! 5. `mips` contains each of these images at all sizes.
+//! 5. `moved_edges` is its ink that has spread.
+//! 6. `mips` contains each of these images at all sizes.
 
 pub mod background;
 pub mod covers;
 pub(crate) mod mips;
+mod moved_edges;
 pub mod page;
 mod paths;

@@ -6,6 +6,7 @@
 use glam::DVec2;
 
 use super::mips::{Beyond, Footprint, Mips};
+use super::moved_edges::with_moved_edges;
 use super::paths::Vertices;
 use crate::photographs::PhotographError;
 use deltille::artwork::ArtworkError;
@@ -112,6 +113,14 @@ impl PrintedPage {
             px_per_mm: page.px_per_mm,
             brightness: Mips::new(page.image, Beyond::Border),
         })
+    }
+
+    /// Returns this page with dark areas that have grown on every side by a fraction of an edge.
+    pub fn with_moved_edges(&self, edges: f64) -> Self {
+        let px_per_mm = self.px_per_mm / 2.0;
+        let moved = with_moved_edges(self.brightness.half(), edges * self.edge_mm * px_per_mm);
+        let (corners, brightness) = (self.corners.clone(), Mips::new(moved, Beyond::Border));
+        Self { corners, brightness, px_per_mm, ..*self }
     }
 
     /// Returns the centre of the bounding box of all corners, mm, and its size.
