@@ -16,7 +16,7 @@ use crate::grid::untagged::beyond::go_on;
 use crate::grid::untagged::tile_shape::{LARGE_INK, is_of_squares};
 use crate::labels::grid_blur::GridBlur;
 use crate::labels::grid_labels::{FoundGrid, Labels, MAX_CORNERS, report_once};
-use crate::labels::grid_light::{ClearDepth, GridLight};
+use crate::labels::grid_light::{GridLight, TagInsets};
 use crate::labels::placement::labeller::Budget;
 use crate::refine::clearance::{Margin, TagAreas, surroundings};
 use crate::refine::edge_shift::{has_straight_edges, large_shift};
@@ -561,8 +561,7 @@ impl OneTiling {
         };
         let corners = grid.corners.iter().map(placed).collect();
         let [dark, bright] = self.tag_areas.insets(grid);
-        let clear = ClearDepth::within(dark, bright);
-        let light = GridLight::of(image, &corners, grid.kind, clear)?;
+        let light = GridLight::of(image, &corners, grid.kind, TagInsets { dark, bright })?;
         light.blur.is_motion().then_some(light.blur)
     }
 

@@ -12,6 +12,9 @@
 //! completes it. If the blur is wider in one direction, S is also fitted as a Gaussian convolved with a box, as by
 //! motion along a line at constant speed.
 //!
+//! Blur may spread the cells of a tag to its edges. Their mean brightness beside each edge is fitted too, as a step at
+//! the distance at which tags begin.
+//!
 //! Limitations: the whole grid has one blur. Where white is saturated, less of the edge is visible: above a share θ of white,
 //! everything is as bright as white, and S is clipped.
 
@@ -19,7 +22,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec2;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 use super::grid_blur::{EdgeBlur, GridBlur, Spread, row};
 use crate::grid::saddle_grid::SaddleGrid;
@@ -89,28 +92,23 @@ const STRONG_PRIOR: f64 = 1e6;
 /// The same where samples do determine the curvature: a tenth of a sample.
 const WEAK_PRIOR: f64 = 0.1;
 
+/// Prior information that keeps the brightness of tags, relative to their background, at 0 where no sample shows them.
+/// They are half of the contrast brighter or darker, and a sample deviates by a tenth of that.
+const TAG_PRIOR: f64 = 0.01;
+
 /// Depth from the edge at which untagged tiles, bright and dark, are sampled, in tile coordinates.
 const PLAIN_DEPTH: f64 = 0.2;
 
 /// Minimum depth if a tag leaves less room.
 const MIN_DEPTH: f64 = 0.06;
 
-/// Distance from the edges up to which tiles are plain, in tile coordinates.
+/// Distance from the edges of tiles to their tags, in tile coordinates; infinite without tags.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ClearDepth {
+pub(crate) struct TagInsets {
     /// In dark tiles.
     pub dark: f64,
     /// In bright tiles.
     pub bright: f64,
-}
-
-impl ClearDepth {
-    /// Returns the depth in tiles, dark and bright, whose tags begin at these distances from their edges, in tile
-    /// coordinates; infinite without tags.
-    pub(crate) fn within(dark: f64, bright: f64) -> Self {
-        let depth = |inset: f64| inset.clamp(MIN_DEPTH, PLAIN_DEPTH);
-        Self { dark: depth(dark), bright: depth(bright) }
-    }
 }
 
 /// Light and blur of a grid.
@@ -125,7 +123,7 @@ pub(crate) struct GridLight {
     /// Standard deviation of a sample from the model, relative to the contrast.
     pub noise: f64,
     kind: GridKind,
-    clear: ClearDepth,
+    insets: TagInsets,
 }
 
 /// Black and white over a tile, as planes of its coordinates.
@@ -147,6 +145,8 @@ struct Profile {
     distances_px: [f64; ACROSS],
     values: [f64; ACROSS],
     normal: DVec2,
+    /// Distances to the tags in the dark and the bright tile, px.
+    tags_px: [f64; 2],
     saturated: bool,
     /// Variance of a sample, from the differences along the edge.
     variance: f64,
@@ -158,7 +158,7 @@ impl GridLight {
         image: ImageView,
         grid: &SaddleGrid,
         kind: GridKind,
-        clear: ClearDepth,
+        insets: TagInsets,
     ) -> Option<Self> {
         let directions = kind.steps().len() / 2;
         let mut light = Self {
@@ -167,7 +167,7 @@ impl GridLight {
             clipped_share: 1.0,
             noise: 0.0,
             kind,
-            clear,
+            insets,
         };
         let every = (grid.len() * directions).div_ceil(BLUR_EDGES).max(1);
         let edges = grid.keys().flat_map(|&v| (0..directions).map(move |k| (v, k)));
@@ -347,22 +347,19 @@ impl GridLight {
     /// Returns the level of black at an edge, and the contrast to white.
     fn edge_levels(&self, profile: &Profile) -> Option<[f64; 2]> {
         let blur = self.blur.across(profile.normal);
-        let (mut n, mut s1, mut s2, mut v1, mut v2) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        let (mut normal, mut right) = (Matrix3::<f64>::zeros(), Vector3::zeros());
         for (&d, &value) in profile.distances_px.iter().zip(&profile.values) {
-            let s = shown(d, blur, self.clipped_share);
-            let s = s + self.tone * (1.0 - s * s);
-            n += 1.0;
-            s1 += s;
-            s2 += s * s;
-            v1 += value;
-            v2 += s * value;
+            let [s, tag] = profile.shown(d, blur, self.clipped_share);
+            let row = Vector3::new(1.0, s + self.tone * (1.0 - s * s), tag);
+            normal += row * row.transpose();
+            right += row * value;
         }
-        let determinant = n * s2 - s1 * s1;
-        if determinant < NO_EDGE {
+        if normal[(0, 0)] * normal[(1, 1)] - normal[(0, 1)].powi(2) < NO_EDGE {
             return None;
         }
-        let half = (n * v2 - s1 * v1) / determinant;
-        let middle = (s2 * v1 - s1 * v2) / determinant;
+        normal[(2, 2)] += TAG_PRIOR;
+        let solution = normal.cholesky()?.solve(&right);
+        let [middle, half] = [solution[0], solution[1]];
         (half > 0.0).then_some([middle - half, 2.0 * half])
     }
 
@@ -399,7 +396,10 @@ impl GridLight {
         let (dark_px, bright_px) =
             if dark_left { (left_px, right_px) } else { (right_px, left_px) };
         let bright = if dark_left { -left } else { left };
-        let reach = [-self.clear.dark * dark_px, self.clear.bright * bright_px];
+        let [dark_depth, bright_depth] =
+            [self.insets.dark, self.insets.bright].map(|inset| inset.clamp(MIN_DEPTH, PLAIN_DEPTH));
+        let reach = [-dark_depth * dark_px, bright_depth * bright_px];
+        let tags_px = [self.insets.dark * dark_px, self.insets.bright * bright_px];
         let (right, lower) = (image.width() as f64 - 1.0, image.height() as f64 - 1.0);
         let mut saturated = 0;
         let full = SATURATED * f64::from(image.full_scale());
@@ -424,15 +424,8 @@ impl GridLight {
             saturated += usize::from(*value >= full);
         }
         let saturated = saturated >= 2;
-        Some(Profile { distances_px, values, normal: bright, saturated, variance })
+        Some(Profile { distances_px, values, normal: bright, tags_px, saturated, variance })
     }
-}
-
-/// Returns the visible part of S at a distance from an edge, if everything above a share of white
-/// looks white. Scale: black is −1, and apparent white is 1.
-fn shown(distance_px: f64, blur: EdgeBlur, clipped_share: f64) -> f64 {
-    let share = (0.5 + 0.5 * blur.step(distance_px)).min(clipped_share) / clipped_share;
-    2.0 * share - 1.0
 }
 
 /// Sums over the fits of profiles.
@@ -471,14 +464,27 @@ struct ProfileFit {
 }
 
 impl Profile {
-    /// Fits o, a and aκ by least squares.
+    /// Returns the visible part of S at a distance from the edge, if everything above a share of white looks white, and
+    /// that of the tags beside it. Scale: black is −1, and apparent white is 1.
+    fn shown(&self, distance_px: f64, blur: EdgeBlur, clipped_share: f64) -> [f64; 2] {
+        let white = |distance_px: f64| 0.5 + 0.5 * blur.step(distance_px);
+        let share = white(distance_px).min(clipped_share) / clipped_share;
+        let beyond = |inset_px: f64, inside_px: f64| match inset_px.is_finite() {
+            true => white(inside_px - inset_px),
+            false => 0.0,
+        };
+        let [dark, bright] = self.tags_px;
+        [2.0 * share - 1.0, beyond(dark, -distance_px) - beyond(bright, distance_px)]
+    }
+
+    /// Fits o, a, aκ and the brightness of the tags by least squares.
     fn fit(&self, blur: EdgeBlur, clipped_share: f64) -> Option<ProfileFit> {
-        let mut normal = Matrix3::<f64>::zeros();
-        let mut right = Vector3::zeros();
+        let mut normal = Matrix4::<f64>::zeros();
+        let mut right = Vector4::zeros();
         let mut power = 0.0;
         for (&d, &value) in self.distances_px.iter().zip(&self.values) {
-            let s = shown(d, blur, clipped_share);
-            let row = Vector3::new(1.0, s, 1.0 - s * s);
+            let [s, tag] = self.shown(d, blur, clipped_share);
+            let row = Vector4::new(1.0, s, 1.0 - s * s, tag);
             normal += row * row.transpose();
             right += row * value;
             power += value * value;
@@ -486,6 +492,7 @@ impl Profile {
         // Sharp edges have no samples that determine the curvature, and clipping resembles a
         // curvature.
         normal[(2, 2)] += if clipped_share < 1.0 { STRONG_PRIOR } else { WEAK_PRIOR };
+        normal[(3, 3)] += TAG_PRIOR;
         let solution = normal.cholesky()?.solve(&right);
         let squares = (power - solution.dot(&right)).max(0.0);
         Some(ProfileFit { half_contrast: solution[1], curved: solution[2], squares })

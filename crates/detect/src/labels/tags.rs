@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use super::grid_light::{ClearDepth, GridLight};
+use super::grid_light::{GridLight, TagInsets};
 use super::joint_cells::JointOdds;
 use super::soft_cells::{CellModel, Mixings, Sample, in_tile};
 use super::tile_map::TileMap;
@@ -112,7 +112,7 @@ pub(crate) struct TagReader {
     tags_in: TagsIn,
     gap_edges: Option<f64>,
     model: CellModel,
-    clear: ClearDepth,
+    insets: TagInsets,
     /// For each bit, the bit whose cell takes its position in a mirror image.
     mirror: Vec<u8>,
     /// Bits of cells that no code uses, and that may contain a hole.
@@ -137,9 +137,9 @@ impl TagReader {
         let cells = family.cells();
         let inset_bits = margin_bits + border_bits;
         let width = cells.width(inset_bits);
-        let clear = match tags_in {
-            TagsIn::Black => ClearDepth::within(border_bits / width, f64::INFINITY),
-            TagsIn::White => ClearDepth::within(f64::INFINITY, margin_bits / width),
+        let insets = match tags_in {
+            TagsIn::Black => TagInsets { dark: border_bits / width, bright: f64::INFINITY },
+            TagsIn::White => TagInsets { dark: f64::INFINITY, bright: margin_bits / width },
         };
         let model = CellModel::new(&cells, inset_bits, margin_bits);
         Self {
@@ -147,7 +147,7 @@ impl TagReader {
             tags_in,
             gap_edges,
             model,
-            clear,
+            insets,
             mirror: cells.mirror(),
             free: family.free_cells(),
         }
@@ -163,9 +163,9 @@ impl TagReader {
         inverted: bool,
         most: usize,
     ) -> Read {
-        let ClearDepth { dark, bright } = self.clear;
-        let clear = if inverted { ClearDepth { dark: bright, bright: dark } } else { self.clear };
-        let Some(light) = GridLight::of(image, grid, self.kind, clear) else {
+        let TagInsets { dark, bright } = self.insets;
+        let insets = if inverted { TagInsets { dark: bright, bright: dark } } else { self.insets };
+        let Some(light) = GridLight::of(image, grid, self.kind, insets) else {
             return Read::default();
         };
         let dark = (self.tags_in == TagsIn::Black) != inverted;
