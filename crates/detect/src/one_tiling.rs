@@ -68,6 +68,9 @@ const UM_IN_MM: f64 = 1e3;
 /// Blur above which motion is estimated before corners are fitted, px. Fits without motion converge below it.
 const MIN_MOTION_BLUR_PX: f64 = 1.5;
 
+/// Largest displacement of edges by tags that are blurred into them, in standard deviations of the blur.
+const TAG_SHIFT_BLURS: f64 = 1.0;
+
 /// Largest radius of the model refinement, px. Beyond it, the curvature of edges by lens distortion
 /// costs more accuracy than a wider window gains.
 const MODEL_RADIUS: usize = 10;
@@ -515,7 +518,11 @@ impl OneTiling {
         let finest = Level { image: frame.image, enlarged: 0, coarser: &levels[1..] };
         let mut blurs = self.refiner.blurs(fitter, finest, grids, &self.tag_areas);
         let motion = self.motion(frame.image, grids, &blurs);
-        let shift = || large_shift(frame.image, grids).filter(|_| self.refiner.is_ink_open());
+        let blur_px = blurs.iter().copied().flatten().reduce(f64::min);
+        let by_tags_px =
+            TAG_SHIFT_BLURS * blur_px.filter(|_| !self.tag_areas.is_empty()).unwrap_or(0.0);
+        let shift =
+            || large_shift(frame.image, grids, by_tags_px).filter(|_| self.refiner.is_ink_open());
         let (mut refiner, mut least) = (Cow::Borrowed(&self.refiner), 0);
         if let Some(motion) = motion {
             refiner = Cow::Owned(self.refiner.with_motion_near(motion.astigmatism()));
