@@ -22,11 +22,15 @@ use crate::grid::saddle_grid::SaddleGrid;
 use crate::levels::MIN_LEVEL_SIDE;
 use deltille_core::raster::{Gray, Pyramid};
 
-/// A filter that moves edges.
-type Filter = fn(i16, i16) -> i16;
-
-/// Maximum displacement of the edges, px of a level.
-const MAX_STEPS: i32 = 2;
+/// Displacement of the edges, by one and by two px of a level.
+#[derive(Clone, Copy)]
+enum Move {
+    None,
+    /// Dark areas grow.
+    In,
+    /// Dark areas shrink.
+    Out,
+}
 
 /// Returns the grids of the level and the displacement that show the largest grid, in px of level 0.
 pub(crate) fn grids_of_moved_edges<const N: usize>(
@@ -34,23 +38,31 @@ pub(crate) fn grids_of_moved_edges<const N: usize>(
     pyramid: &Pyramid,
     whole: Option<&WholeBoard>,
 ) -> Vec<SaddleGrid> {
-    let views: Vec<(usize, i32)> = (1..pyramid.levels().len())
-        .filter(|&level| !is_all_noise(&pyramid.levels()[level]))
-        .flat_map(|level| (-MAX_STEPS..=MAX_STEPS).map(move |steps| (level, steps)))
-        .collect();
-    let found = views.into_par_iter().map(|(level, steps)| {
+    let levels =
+        (1..pyramid.levels().len()).filter(|&level| !is_all_noise(&pyramid.levels()[level]));
+    let views: Vec<(usize, Move)> =
+        levels.flat_map(|level| [Move::None, Move::In, Move::Out].map(|to| (level, to))).collect();
+    let found = views.into_par_iter().flat_map_iter(|(level, to)| {
         let coarse = pyramid.from_level(level);
-        let filter = if steps < 0 { i16::min } else { i16::max };
-        let moved = (0..steps.abs())
-            .fold(coarse.levels()[0].clone(), |image, _| with_moved_edges(&image, filter));
-        // Its first level is blurred, so that gaps of a pixel close.
-        let coarse = Pyramid::new(&moved, coarse.levels().len(), MIN_LEVEL_SIDE);
-        let saddles = finder.find(&coarse);
-        let mut found = grids(finder, &coarse, &saddles, whole);
-        for placed in found.iter_mut().flat_map(|grid| grid.values_mut()) {
-            placed.position = Pyramid::to_level_0(level, placed.position);
-        }
-        found
+        let [image, ..] = coarse.levels() else { return Vec::new() };
+        let grids_of = |image: &Gray<i16>| {
+            // Its first level is blurred, so that gaps of a pixel close.
+            let blurred = Pyramid::new(image, coarse.levels().len(), MIN_LEVEL_SIDE);
+            let saddles = finder.find(&blurred);
+            let mut found = grids(finder, &blurred, &saddles, whole);
+            for placed in found.iter_mut().flat_map(|grid| grid.values_mut()) {
+                placed.position = Pyramid::to_level_0(level, placed.position);
+            }
+            found
+        };
+        let moved = |image: &Gray<i16>| match to {
+            Move::None => None,
+            Move::In => Some(with_moved_edges(image, i16::min)),
+            Move::Out => Some(with_moved_edges(image, i16::max)),
+        };
+        let Some(first) = moved(image) else { return vec![grids_of(image)] };
+        let second = moved(&first);
+        [Some(first), second].iter().flatten().map(grids_of).collect()
     });
     let size = |grids: &Vec<SaddleGrid>| grids.first().map_or(0, |grid| grid.len());
     // Of equally good ones, the first: the finest level.
@@ -59,13 +71,16 @@ pub(crate) fn grids_of_moved_edges<const N: usize>(
 }
 
 /// Returns an image with the minimum or maximum over 3 × 3 pixels at each pixel.
-fn with_moved_edges(image: &Gray<i16>, filter: Filter) -> Gray<i16> {
-    let (width, height) = (image.width(), image.height());
+fn with_moved_edges(image: &Gray<i16>, filter: impl Fn(i16, i16) -> i16 + Copy) -> Gray<i16> {
+    let height = image.height();
     let mut along = image.clone();
     for y in 0..height {
-        let row = image.row(y);
-        for (x, out) in along.row_mut(y).iter_mut().enumerate() {
-            *out = filter(filter(row[x.saturating_sub(1)], row[x]), row[(x + 1).min(width - 1)]);
+        let (row, out) = (image.row(y), along.row_mut(y));
+        for (out, next) in out.iter_mut().zip(&row[1..]) {
+            *out = filter(*out, *next);
+        }
+        for (out, before) in out[1..].iter_mut().zip(row) {
+            *out = filter(*out, *before);
         }
     }
     let mut both = along.clone();
