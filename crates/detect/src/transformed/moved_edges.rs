@@ -17,20 +17,14 @@ use rayon::prelude::*;
 
 use crate::corners::saddles::{SaddleFinder, is_all_noise};
 use crate::grid::grids::grids;
+use crate::grid::links::link::has_chain;
 use crate::grid::outline::WholeBoard;
 use crate::grid::saddle_grid::SaddleGrid;
 use crate::levels::MIN_LEVEL_SIDE;
 use deltille_core::raster::{Gray, Pyramid};
 
-/// Displacement of the edges, by one and by two px of a level.
-#[derive(Clone, Copy)]
-enum Move {
-    None,
-    /// Dark areas grow.
-    In,
-    /// Dark areas shrink.
-    Out,
-}
+/// Maximum displacement of the edges, px of a level.
+const MAX_STEPS: usize = 2;
 
 /// Returns the grids of the level and the displacement that show the largest grid, in px of level 0.
 pub(crate) fn grids_of_moved_edges<const N: usize>(
@@ -38,36 +32,54 @@ pub(crate) fn grids_of_moved_edges<const N: usize>(
     pyramid: &Pyramid,
     whole: Option<&WholeBoard>,
 ) -> Vec<SaddleGrid> {
-    let levels =
-        (1..pyramid.levels().len()).filter(|&level| !is_all_noise(&pyramid.levels()[level]));
-    let views: Vec<(usize, Move)> =
-        levels.flat_map(|level| [Move::None, Move::In, Move::Out].map(|to| (level, to))).collect();
-    let found = views.into_par_iter().flat_map_iter(|(level, to)| {
+    let of_level = |level: usize| -> Vec<View> {
         let coarse = pyramid.from_level(level);
-        let [image, ..] = coarse.levels() else { return Vec::new() };
-        let grids_of = |image: &Gray<i16>| {
+        let seen = |image: &Gray<i16>| {
             // Its first level is blurred, so that gaps of a pixel close.
             let blurred = Pyramid::new(image, coarse.levels().len(), MIN_LEVEL_SIDE);
             let saddles = finder.find(&blurred);
-            let mut found = grids(finder, &blurred, &saddles, whole);
-            for placed in found.iter_mut().flat_map(|grid| grid.values_mut()) {
+            let mut grids = grids(finder, &blurred, &saddles, whole);
+            for placed in grids.iter_mut().flat_map(|grid| grid.values_mut()) {
                 placed.position = Pyramid::to_level_0(level, placed.position);
             }
-            found
+            View { grids, has_chain: has_chain(&blurred, &saddles) }
         };
-        let moved = |image: &Gray<i16>| match to {
-            Move::None => None,
-            Move::In => Some(with_moved_edges(image, i16::min)),
-            Move::Out => Some(with_moved_edges(image, i16::max)),
-        };
-        let Some(first) = moved(image) else { return vec![grids_of(image)] };
-        let second = moved(&first);
-        [Some(first), second].iter().flatten().map(grids_of).collect()
-    });
-    let size = |grids: &Vec<SaddleGrid>| grids.first().map_or(0, |grid| grid.len());
-    // Of equally good ones, the first: the finest level.
-    let better = |a, b| if size(&b) > size(&a) { b } else { a };
-    found.collect::<Vec<_>>().into_iter().reduce(better).unwrap_or_default()
+        let image = &coarse.levels()[0];
+        let ways: [&(dyn Fn() -> Vec<View> + Sync); 3] = [
+            &|| vec![seen(image)],
+            &|| in_steps(image, i16::min).iter().map(seen).collect(),
+            &|| in_steps(image, i16::max).iter().map(seen).collect(),
+        ];
+        ways.into_par_iter().flat_map_iter(|way| way()).collect()
+    };
+    let (mut best, mut may_be_finer) = (Vec::new(), true);
+    let size = |grids: &[SaddleGrid]| grids.first().map_or(0, |grid| grid.len());
+    for level in (1..pyramid.levels().len()).rev() {
+        // The finest level takes most of the time. On the next one, the tiles of its boards have half as many pixels, and
+        // some of their corners are already joined.
+        if is_all_noise(&pyramid.levels()[level]) || level == 1 && !may_be_finer {
+            continue;
+        }
+        let views = of_level(level);
+        may_be_finer = views.iter().any(|view| view.has_chain);
+        // Of equally good ones, the finest level.
+        let largest = views.into_iter().map(|view| view.grids).max_by_key(|grids| size(grids));
+        best = largest.filter(|grids| size(grids) >= size(&best)).unwrap_or(best);
+    }
+    best
+}
+
+/// What an image shows whose edges have been moved.
+struct View {
+    grids: Vec<SaddleGrid>,
+    /// Whether corners are joined, as on a board.
+    has_chain: bool,
+}
+
+/// Returns images whose edges have been moved by one and by more pixels.
+fn in_steps(image: &Gray<i16>, filter: impl Fn(i16, i16) -> i16 + Copy) -> Vec<Gray<i16>> {
+    let next = |image: &Gray<i16>| Some(with_moved_edges(image, filter));
+    std::iter::successors(next(image), next).take(MAX_STEPS).collect()
 }
 
 /// Returns an image with the minimum or maximum over 3 × 3 pixels at each pixel.
