@@ -365,7 +365,7 @@ def _listed(paths: Paths, filesystem: Any) -> list[str]:
         inner = sorted(
             file.path[len(inside) :].lstrip("/")
             for file in found
-            if file.is_file and file.path.lower().endswith(_ENDINGS) and not file.path.endswith(".overlay.png")
+            if file.is_file and file.path.lower().endswith(_ENDINGS) and not file.path.endswith(".overlay.jpg")
         )
         listed.extend(f"{text.rstrip('/')}/{name}" for name in inner)
     return list(dict.fromkeys(listed))

@@ -410,8 +410,8 @@ export function see(): HTMLElement {
 
   async function overlay(photo: Photo): Promise<void> {
     try {
-      const png = await looking.call("overlay", photo.name, await photo.bytes(), photo.result?.json ?? "");
-      save(`${stem(photo.name)}.overlay.png`, png as Uint8Array<ArrayBuffer>, "image/png");
+      const jpeg = await looking.call("overlay", photo.name, await photo.bytes(), photo.result?.json ?? "");
+      save(`${stem(photo.name)}.overlay.jpg`, jpeg as Uint8Array<ArrayBuffer>, "image/jpeg");
     } catch (error) {
       showError(error);
     }

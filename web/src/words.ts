@@ -126,7 +126,7 @@ export const words = {
     inked: (ink: string, photographs: number) => `Combined estimate from ${photographs} photographs of one print: ${ink}. Detection was repeated with it.`,
     remove: "Remove all",
     removeThis: "Remove this one",
-    overlay: "Overlay (PNG)",
+    overlay: "Overlay (JPEG)",
     time: (ms: number) => `${ms.toFixed(0)} ms`,
     corner: (row: number, col: number, id: number | null, sx: number, sy: number) =>
       `Row ${row}, column ${col}${id === null ? "" : `, id ${id}`}: ± ${sx.toFixed(4)} × ${sy.toFixed(4)} px (1σ).`,

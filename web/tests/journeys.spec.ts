@@ -269,7 +269,7 @@ test.describe("see", () => {
     // Standard deviations of tone and ink depend on the processor's order of summation.
     expect(apart(found, expected)).toBeLessThan(1e-10);
     expect(corners(found as Detection)).toEqual(corners(expected as Detection));
-    for (const [button, file] of [["CSV", "0.csv"], ["ORPC", "0.orpc"], ["Overlay (PNG)", "0.overlay.png"]] as const) {
+    for (const [button, file] of [["CSV", "0.csv"], ["ORPC", "0.orpc"], ["Overlay (JPEG)", "0.overlay.jpg"]] as const) {
       expect((await press(page, button)).equals(readFileSync(join(out, file))), file).toBe(true);
     }
     const ms = await page.locator(".stage").getByText(/\d+ ms\./).textContent();

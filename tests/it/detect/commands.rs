@@ -65,7 +65,7 @@ fn a_rendered_sheet_is_found_with_every_label_in_every_format() {
         assert_eq!(csv.lines().count(), 43);
         assert!(csv.lines().nth(1).unwrap().starts_with("0,deltille,0,0,2,0,"));
 
-        let overlay = deltille::photograph::read(path("out/board.overlay.png")).unwrap();
+        let overlay = deltille::photograph::read(path("out/board.overlay.jpg")).unwrap();
         assert!(overlay.width() as u32 >= found.width);
     }
 }

@@ -163,7 +163,7 @@ fn nothing_is_written_through_a_link() {
     std::fs::create_dir(at.join("out")).unwrap();
     let commands = [
         ("board --rows 5 --cols 6 --pdf -o out", "board.pdf"),
-        ("detect t.png --target t.json --overlay -o out", "t.overlay.png"),
+        ("detect t.png --target t.json --overlay -o out", "t.overlay.jpg"),
         ("refine --kind deltille --seeds seeds.csv t.png -o out/corners.csv", "corners.csv"),
         ("verify t.json t.png --report out/verdict.json", "verdict.json"),
         ("board --rows 5 --cols 6 --pdf --save-template out/t.toml -o out", "t.toml"),
@@ -193,12 +193,12 @@ fn results_of_an_image_appear_together() {
     deltille(at, "board --rows 4 --cols 4 --png --dpi 200 --name a --no-verify").success();
     std::fs::copy(at.join("a.png"), at.join("b.png")).unwrap();
     // The second file cannot be written.
-    std::fs::create_dir_all(at.join("out/b.overlay.png")).unwrap();
+    std::fs::create_dir_all(at.join("out/b.overlay.jpg")).unwrap();
     let (code, said) =
         run(DELTILLE, at, "detect a.png b.png --target a.json --overlay --ink none -o out");
     assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("1 of 2 images failed"), "{said}");
-    assert_eq!(names(&at.join("out")), ["a.json", "a.overlay.png", "b.overlay.png"]);
+    assert_eq!(names(&at.join("out")), ["a.json", "a.overlay.jpg", "b.overlay.jpg"]);
 }
 
 /// Quotes from a file are short.

@@ -69,11 +69,11 @@ impl Photograph {
         }
     }
 
-    /// Draws a detection over the image, as `deltille detect --overlay` does, and returns a PNG file.
+    /// Draws a detection over the image, as `deltille detect --overlay` does, and returns a JPEG file.
     ///
     /// # Errors
     /// Throws if `found` is not a valid detection, or if the image is too large to draw on.
     pub fn overlay(&self, found: &str) -> Result<Vec<u8>, JsError> {
-        overlay::png(&self.photograph.image, &detection::read(found).raise()?).raise()
+        overlay::jpeg(&self.photograph.image, &detection::read(found).raise()?).raise()
     }
 }

@@ -87,7 +87,7 @@ pub fn photographs_in(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
         let path = entry.with_context(|| format!("cannot read {}", folder.display()))?.path();
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
         // Overlays drawn by an earlier run are not photographs.
-        let drawn = path.to_string_lossy().ends_with(".overlay.png");
+        let drawn = path.to_string_lossy().ends_with(".overlay.jpg");
         if extension.is_some_and(|e| EXTENSIONS.contains(&e.as_str())) && !drawn && path.is_file() {
             images.push(path);
         }

@@ -41,7 +41,7 @@ pub struct Args {
     /// Output formats, separated by commas
     #[arg(long, value_delimiter = ',', default_value = "json", value_parser = format(DETECTION_FORMATS))]
     format: Vec<&'static DetectionFormat>,
-    /// Also write <image>.overlay.png: corners, grid and ids drawn over the photograph
+    /// Also write <image>.overlay.jpg: corners, grid and ids drawn over the photograph
     #[arg(long)]
     overlay: bool,
     /// Include the run time of each stage in the JSON, ms (makes the output differ between runs)
@@ -406,7 +406,7 @@ impl Args {
     fn results(&self, stem: &str) -> Vec<(PathBuf, Kind)> {
         let Some(folder) = self.folder() else { return Vec::new() };
         let formats = self.each().map(|format| (format.name(), format.kind()));
-        let overlay = self.overlay.then(|| ("overlay.png", Kind::own_png()));
+        let overlay = self.overlay.then(|| ("overlay.jpg", Kind::own_jpeg()));
         let all = formats.chain(overlay);
         all.map(|(end, kind)| (folder.join(format!("{stem}.{end}")), kind)).collect()
     }
@@ -439,7 +439,7 @@ fn one_image(
         };
         let mut files: Vec<(PathBuf, Vec<u8>)> = args.format.iter().filter_map(text).collect();
         if args.overlay {
-            files.push((path("overlay.png"), overlay::png(&image, &found)?));
+            files.push((path("overlay.jpg"), overlay::jpeg(&image, &found)?));
         }
         atomic::write_together(&files)?;
     }

@@ -2,15 +2,17 @@
 //!
 //! Edges of grids are lines, and corners are rings around the unmarked point. Corner ids (or row and column in an unlabelled
 //! grid) are beside the corners, tag ids in their tiles. Every grid has its own colour. Line widths and text scale with the size
-//! of the tiles, and a small photograph is enlarged, so all text is legible.
+//! of the tiles, and a small photograph is enlarged, so all text is legible. A photograph of large tiles is reduced.
 
 use glam::DVec2;
+use image::ExtendedColorType;
+use image::codecs::jpeg::JpegEncoder;
 use tiny_skia::{
     Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, PixmapPaint, Stroke,
     Transform,
 };
 
-use crate::export::writing::kind::signed_png;
+use crate::export::writing::kind::{signed_jpeg, signed_png};
 use deltille_core::detection::{Detection, Grid};
 use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::raster::{AnyGray, Gray, Intensity};
@@ -26,6 +28,8 @@ const READABLE_EDGE_PX: f64 = 52.0;
 /// Maximum enlargement of a photograph, and the maximum side length after it, px.
 const MAX_ENLARGED: u32 = 8;
 const MAX_SIDE_PX: u32 = 4096;
+/// Quality of the JPEG file. Text has no visible halo.
+const QUALITY: u8 = 88;
 /// Text height, line width and ring radius as fractions of the tile edge.
 const TEXT_EDGES: f64 = 0.17;
 const TAG_TEXT_EDGES: f64 = 0.3;
@@ -39,27 +43,32 @@ pub enum OverlayError {
     /// The image is too large for memory.
     #[error("an image of {0} × {1} pixels is too large to draw on")]
     TooLarge(u32, u32),
-    /// The PNG encoder failed.
+    /// The encoder failed.
     #[error("the overlay cannot be encoded: {0}")]
     Encode(String),
 }
 
-/// Returns the PNG file of a photograph with its detection drawn on it. `detection` has positions in px of `image`.
+/// Returns the JPEG file of a photograph with its detection drawn on it. `detection` has positions in px of `image`.
 ///
 /// # Errors
 /// Returns an error if the image is too large to draw on, or if it cannot be encoded.
-pub fn png(image: &AnyGray, detection: &Detection) -> Result<Vec<u8>, OverlayError> {
-    let scale = enlargement(image.width() as u32, image.height() as u32, detection);
+pub fn jpeg(image: &AnyGray, detection: &Detection) -> Result<Vec<u8>, OverlayError> {
+    let scale = Scale::of([image.width(), image.height()].map(|side| side as u32), detection);
     let mut canvas = match image {
         AnyGray::U8(image) => background(image, scale)?,
         AnyGray::U16(image) => background(image, scale)?,
     };
     for (index, grid) in detection.grids.iter().enumerate() {
         let [r, g, b] = COLOURS[index % COLOURS.len()];
-        draw_grid(&mut canvas, grid, Color::from_rgba8(r, g, b, 255), f64::from(scale));
+        draw_grid(&mut canvas, grid, Color::from_rgba8(r, g, b, 255), scale.factor());
     }
-    let png = canvas.encode_png().map_err(|error| OverlayError::Encode(error.to_string()))?;
-    Ok(signed_png(png))
+    let opaque: Vec<u8> =
+        canvas.pixels().iter().flat_map(|p| [p.red(), p.green(), p.blue()]).collect();
+    let mut jpeg = Vec::new();
+    JpegEncoder::new_with_quality(&mut jpeg, QUALITY)
+        .encode(&opaque, canvas.width(), canvas.height(), ExtendedColorType::Rgb8)
+        .map_err(|error| OverlayError::Encode(error.to_string()))?;
+    Ok(signed_jpeg(jpeg))
 }
 
 /// Returns a PNG file with outlines and dots drawn over a photograph, or over a black image of the
@@ -70,8 +79,8 @@ pub(in crate::export) fn outlined(
     drawn: Option<&Outlined>,
 ) -> Result<Vec<u8>, OverlayError> {
     let mut canvas = match image {
-        Some(AnyGray::U8(image)) => background(image, 1)?,
-        Some(AnyGray::U16(image)) => background(image, 1)?,
+        Some(AnyGray::U8(image)) => background(image, Scale::ONE)?,
+        Some(AnyGray::U16(image)) => background(image, Scale::ONE)?,
         None => {
             let mut black =
                 Pixmap::new(width, height).ok_or(OverlayError::TooLarge(width, height))?;
@@ -131,28 +140,65 @@ impl Outlined<'_> {
     }
 }
 
-/// The factor by which the photograph is enlarged.
-fn enlargement(width: u32, height: u32, detection: &Detection) -> u32 {
-    let edges = detection.grids.iter().filter_map(Grid::edge_px);
-    let shortest = edges.fold(READABLE_EDGE_PX, f64::min);
-    let wanted = (READABLE_EDGE_PX / shortest.max(1.0)).ceil() as u32;
-    let possible = (MAX_SIDE_PX / width.max(height).max(1)).max(1);
-    wanted.clamp(1, possible.min(MAX_ENLARGED))
+/// Size of the overlay relative to the photograph.
+#[derive(Clone, Copy, PartialEq)]
+enum Scale {
+    /// Enlarged by this factor.
+    Up(u32),
+    /// Reduced: the mean over squares with this side, px.
+    Down(u32),
 }
 
-fn background<T: Intensity>(image: &Gray<T>, scale: u32) -> Result<Pixmap, OverlayError> {
-    let (width, height) = (image.width() as u32, image.height() as u32);
+impl Scale {
+    const ONE: Self = Self::Up(1);
+
+    /// Returns the scale at which the text of a detection is legible, and not much larger.
+    fn of([width, height]: [u32; 2], detection: &Detection) -> Self {
+        let longest = width.max(height).max(1);
+        let edges = detection.grids.iter().filter_map(Grid::edge_px);
+        let shortest = edges.reduce(f64::min).unwrap_or(f64::INFINITY).max(1.0);
+        let fits = longest.div_ceil(MAX_SIDE_PX);
+        // Without a grid, there is nothing to read.
+        let largest = longest.div_ceil(MAX_SIDE_PX / 2).max(fits);
+        match ((shortest / READABLE_EDGE_PX) as u32).clamp(fits, largest) {
+            1 => {
+                let wanted = (READABLE_EDGE_PX / shortest).ceil() as u32;
+                Self::Up(wanted.clamp(1, (MAX_SIDE_PX / longest).clamp(1, MAX_ENLARGED)))
+            }
+            down => Self::Down(down),
+        }
+    }
+
+    fn factor(self) -> f64 {
+        match self {
+            Self::Up(up) => f64::from(up),
+            Self::Down(down) => 1.0 / f64::from(down),
+        }
+    }
+}
+
+fn background<T: Intensity>(image: &Gray<T>, scale: Scale) -> Result<Pixmap, OverlayError> {
+    let down = if let Scale::Down(down) = scale { down as usize } else { 1 };
+    let [width, height] = [image.width(), image.height()].map(|side| (side / down) as u32);
     let too_large = || OverlayError::TooLarge(width, height);
     let mut canvas = Pixmap::new(width, height).ok_or_else(too_large)?;
-    for (pixel, value) in canvas.pixels_mut().iter_mut().zip(image.pixels()) {
-        let grey = (value.to_f32() / T::FULL_SCALE * 255.0).round() as u8;
-        *pixel = tiny_skia::ColorU8::from_rgba(grey, grey, grey, 255).premultiply();
+    let part = 255.0 / (T::FULL_SCALE * (down * down) as f32);
+    let mut sums = vec![0.0; width as usize];
+    for (y, row) in canvas.pixels_mut().chunks_mut(width as usize).enumerate() {
+        sums.fill(0.0);
+        for inner in down * y..down * (y + 1) {
+            for (sum, square) in sums.iter_mut().zip(image.row(inner).chunks(down)) {
+                *sum += square.iter().map(|value| value.to_f32()).sum::<f32>();
+            }
+        }
+        for (pixel, sum) in row.iter_mut().zip(&sums) {
+            let grey = (sum * part).round() as u8;
+            *pixel = tiny_skia::ColorU8::from_rgba(grey, grey, grey, 255).premultiply();
+        }
     }
-    if scale == 1 {
-        return Ok(canvas);
-    }
-    let mut large = Pixmap::new(width * scale, height * scale).ok_or_else(too_large)?;
-    let enlarge = Transform::from_scale(scale as f32, scale as f32);
+    let Scale::Up(up @ 2..) = scale else { return Ok(canvas) };
+    let mut large = Pixmap::new(width * up, height * up).ok_or_else(too_large)?;
+    let enlarge = Transform::from_scale(up as f32, up as f32);
     large.draw_pixmap(0, 0, canvas.as_ref(), &PixmapPaint::default(), enlarge, None);
     Ok(large)
 }

@@ -70,6 +70,8 @@ impl Kind {
             let Png { software, is_to_scale } = Png::of(content);
             let is_own = software.is_some_and(|by| by.starts_with(b"deltille "));
             signed(if is_to_scale && is_own { "PNG to scale" } else { "PNG" }, is_own)
+        } else if content.starts_with(JPEG_START) {
+            signed("JPEG", comment(content).is_some_and(|by| by.starts_with(b"deltille ")))
         } else if content.starts_with(crate::export::detections::npy::MAGIC) {
             Self::words("an array of NumPy")
         } else if content.starts_with(PARQUET) {
@@ -135,6 +137,11 @@ impl Kind {
     /// The kind of the PNG files that this program writes for viewing: overlays, renderings, plots.
     pub fn own_png() -> Self {
         Self::words("a PNG written by deltille")
+    }
+
+    /// The kind of the JPEG files that this program writes: overlays.
+    pub fn own_jpeg() -> Self {
+        Self::words("a JPEG written by deltille")
     }
 
     /// The kind of the PNG files that this program writes for printing.
@@ -214,6 +221,9 @@ fn plain(line: &str) -> String {
     words.collect::<String>().trim().to_owned()
 }
 
+/// First bytes of a JPEG, and the marker of a comment.
+const JPEG_START: &[u8] = b"\xff\xd8\xff";
+const COMMENT: [u8; 2] = *b"\xff\xfe";
 /// The first bytes of every PNG.
 const PNG_SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
@@ -267,6 +277,21 @@ pub fn signed_png(mut png: Vec<u8>) -> Vec<u8> {
         png.splice(HEAD_END..HEAD_END, chunk);
     }
     png
+}
+
+/// Adds the name of this program to a JPEG, as its first comment.
+pub fn signed_jpeg(mut jpeg: Vec<u8>) -> Vec<u8> {
+    let text = crate::export::GENERATOR.as_bytes();
+    let length = (text.len() as u16 + 2).to_be_bytes();
+    let comment = [&COMMENT[..], &length, text].concat();
+    let after_start = 2.min(jpeg.len());
+    jpeg.splice(after_start..after_start, comment);
+    jpeg
+}
+
+/// The comment after the start of a JPEG, and the bytes after it.
+fn comment(jpeg: &[u8]) -> Option<&[u8]> {
+    jpeg.get(2..)?.strip_prefix(&COMMENT)?.get(2..)
 }
 
 /// The JSON chunk of a binary glTF, after 20 bytes of headers.
