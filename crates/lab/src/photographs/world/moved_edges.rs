@@ -34,9 +34,9 @@ pub(super) fn with_moved_edges(image: &Gray<u8>, px: f64) -> Gray<u8> {
     let rows = (0..height).into_par_iter().map(|y| {
         let (first, last) = (y.saturating_sub(reach), (y + reach).min(height - 1));
         let mut nearest = vec![f32::INFINITY; width];
-        for other in first..=last {
+        for (other, in_row) in in_rows.iter().enumerate().take(last + 1).skip(first) {
             let off = (other.abs_diff(y) as f32).powi(2);
-            let row = in_rows[other].iter().map(|far| far + off);
+            let row = in_row.iter().map(|far| far + off);
             nearest.iter_mut().zip(row).for_each(|(least, far)| *least = least.min(far));
         }
         // A pixel is covered as far as the boundary has moved into it.
