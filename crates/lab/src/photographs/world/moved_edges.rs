@@ -4,47 +4,62 @@ use rayon::prelude::*;
 
 use deltille::raster::Gray;
 
-/// Grey value between ink and paper.
-const MIDDLE: u8 = 128;
-
 /// Returns an image whose dark areas have grown by `px` on every side, or shrunk if it is negative: all points that are
 /// no farther than this from a dark area.
 pub(super) fn with_moved_edges(image: &Gray<u8>, px: f64) -> Gray<u8> {
     let (width, height) = (image.width(), image.height());
-    let reach = px.abs().ceil() as usize + 1;
-    let grows = |value: u8| (value < MIDDLE) == (px > 0.0);
+    let reach = px.abs().ceil() as usize + 2;
     let still = if px > 0.0 { 255.0 } else { 0.0 };
-    // The squared distance in the row to the nearest pixel whose colour grows.
-    let in_rows: Vec<Vec<f32>> = (0..height)
+    // The part of a pixel that has the colour that grows.
+    let part = |x: usize, y: usize| (f32::from(image.at(x, y)) - still).abs() / 255.0;
+    // The nearest column in each row whose pixel has mostly this colour.
+    let nearest_columns: Vec<Vec<f32>> = (0..height)
         .into_par_iter()
         .map(|y| {
-            let mut far = vec![f32::INFINITY; width];
+            let mut nearest = vec![f32::INFINITY; width];
             let mut sweep = |columns: &mut dyn Iterator<Item = usize>| {
-                let mut since = f32::INFINITY;
+                let mut last = f32::INFINITY;
                 for x in columns {
-                    since = if grows(image.at(x, y)) { 0.0 } else { since + 1.0 };
-                    far[x] = far[x].min(since * since);
+                    last = if part(x, y) >= 0.5 { x as f32 } else { last };
+                    if (last - x as f32).abs() < (nearest[x] - x as f32).abs() {
+                        nearest[x] = last;
+                    }
                 }
             };
             sweep(&mut (0..width));
             sweep(&mut (0..width).rev());
-            far
+            nearest
         })
         .collect();
-    let rows = (0..height).into_par_iter().map(|y| {
+    let row = |y: usize| {
         let (first, last) = (y.saturating_sub(reach), (y + reach).min(height - 1));
-        let mut nearest = vec![f32::INFINITY; width];
-        for (other, in_row) in in_rows.iter().enumerate().take(last + 1).skip(first) {
+        let mut least = vec![f32::INFINITY; width];
+        let mut rows = vec![y as u32; width];
+        for (other, columns) in nearest_columns.iter().enumerate().take(last + 1).skip(first) {
             let off = (other.abs_diff(y) as f32).powi(2);
-            let row = in_row.iter().map(|far| far + off);
-            nearest.iter_mut().zip(row).for_each(|(least, far)| *least = least.min(far));
+            for (x, column) in columns.iter().enumerate() {
+                let far = (column - x as f32).powi(2) + off;
+                (least[x], rows[x]) =
+                    if far < least[x] { (far, other as u32) } else { (least[x], rows[x]) };
+            }
         }
-        // A pixel is covered as far as the boundary has moved into it.
-        let covered = |far: f32| (px.abs() as f32 + 1.0 - far.sqrt()).clamp(0.0, 1.0);
-        let value = |far: f32| (still + covered(far) * (255.0 - 2.0 * still)).round() as u8;
-        nearest.into_iter().map(value).collect::<Vec<u8>>()
-    });
-    let rows: Vec<Vec<u8>> = rows.collect();
+        let value = |x: usize| {
+            let far = least[x].sqrt();
+            if far > reach as f32 {
+                return still as u8;
+            }
+            // The boundary lies within the nearest pixel, or within the next one on the way from there.
+            let there = [nearest_columns[rows[x] as usize][x], rows[x] as f32];
+            let way = [x as f32 - there[0], y as f32 - there[1]].map(|off| off / far.max(1.0));
+            let next = [0, 1].map(|i| (there[i] + way[i]).round() as usize);
+            let beyond = if far > 0.0 { part(next[0], next[1]) } else { 0.0 };
+            let distance = far + 0.5 - part(there[0] as usize, there[1] as usize) - beyond;
+            let covered = (px.abs() as f32 - distance + 0.5).clamp(0.0, 1.0);
+            (still + covered * (255.0 - 2.0 * still)).round() as u8
+        };
+        (0..width).map(value).collect::<Vec<u8>>()
+    };
+    let rows: Vec<Vec<u8>> = (0..height).into_par_iter().map(row).collect();
     Gray::from_fn(width, height, |x, y| rows[y][x])
 }
 
@@ -52,17 +67,19 @@ pub(super) fn with_moved_edges(image: &Gray<u8>, px: f64) -> Gray<u8> {
 mod tests {
     use super::*;
 
-    /// A square grows into a square with round corners, and shrinks into a square.
+    /// A square grows into a square with round corners, and shrinks into a square. Its edges lie anywhere in a pixel.
     #[test]
     fn a_square_grows_on_every_side() {
-        let square = Gray::from_fn(60, 60, |x, y| {
-            if (20..40).contains(&x) && (20..40).contains(&y) { 0 } else { 255 }
-        });
-        for (px, around) in [(4.5, std::f64::consts::PI - 4.0), (-3.25, 0.0)] {
-            let moved = with_moved_edges(&square, px);
-            let dark = moved.pixels().iter().map(|&v| 1.0 - f64::from(v) / 255.0).sum::<f64>();
-            let expected = (20.0 + 2.0 * px).powi(2) + around * px * px;
-            assert!((dark - expected).abs() < 0.01 * expected, "{px}: {dark}, not {expected}");
+        for end in [40.0, 40.3, 40.8] {
+            let within = |i: usize| (end - i as f64).clamp(0.0, 1.0) * f64::from(u8::from(i >= 20));
+            let square =
+                Gray::from_fn(60, 60, |x, y| (255.0 * (1.0 - within(x) * within(y))).round() as u8);
+            for (px, around) in [(4.5, std::f64::consts::PI - 4.0), (-3.25, 0.0)] {
+                let moved = with_moved_edges(&square, px);
+                let dark = moved.pixels().iter().map(|&v| 1.0 - f64::from(v) / 255.0).sum::<f64>();
+                let expected = (end - 20.0 + 2.0 * px).powi(2) + around * px * px;
+                assert!((dark - expected).abs() < 0.01 * expected, "{end} {px}: {dark} {expected}");
+            }
         }
     }
 }
