@@ -19,7 +19,7 @@ use crate::labels::grid_labels::{FoundGrid, Labels, MAX_CORNERS, report_once};
 use crate::labels::grid_light::{GridLight, TagInsets};
 use crate::labels::placement::labeller::Budget;
 use crate::refine::clearance::{Margin, TagAreas, surroundings};
-use crate::refine::edge_shift::{has_straight_edges, large_shift};
+use crate::refine::edge_shift::{EdgeShift, has_straight_edges, large_shift};
 use crate::refine::model::fitter::CornerFitter;
 use crate::refine::optics::Optics;
 use crate::refine::refine_grid::{Level, is_sampled, sharp_level};
@@ -517,16 +517,15 @@ impl OneTiling {
         let levels = frame.pyramid.levels();
         let finest = Level { image: frame.image, enlarged: 0, coarser: &levels[1..] };
         let mut blurs = self.refiner.blurs(fitter, finest, grids, &self.tag_areas);
-        let motion = self.motion(frame.image, grids, &blurs);
+        let shift = large_shift(frame.image, grids).filter(|_| self.refiner.is_ink_open());
+        let motion = self.motion(frame.image, grids, &blurs, shift);
         let blur_px = blurs.iter().copied().flatten().reduce(f64::min);
         let by_tags_px =
             TAG_SHIFT_BLURS * blur_px.filter(|_| !self.tag_areas.is_empty()).unwrap_or(0.0);
-        let shift =
-            || large_shift(frame.image, grids, by_tags_px).filter(|_| self.refiner.is_ink_open());
         let (mut refiner, mut least) = (Cow::Borrowed(&self.refiner), 0);
         if let Some(motion) = motion {
             refiner = Cow::Owned(self.refiner.with_motion_near(motion.astigmatism()));
-        } else if let Some(shift) = shift() {
+        } else if let Some(shift) = shift.filter(|shift| shift.px > by_tags_px) {
             refiner = Cow::Owned(self.refiner.with_ink_near(shift.edges));
             least = shift.level(levels.len());
         }
@@ -557,8 +556,15 @@ impl OneTiling {
         (optics, are_waves)
     }
 
-    /// Returns the blur of the largest grid of which an edge shows motion, if grids with these blurs, px, may show any.
-    fn motion(&self, image: ImageView, grids: &[Grid], blurs: &[Option<f64>]) -> Option<GridBlur> {
+    /// Returns the blur of the largest grid if its edges show motion and have not moved by `shift` instead. Only grids with
+    /// large blurs, px, may show any.
+    fn motion(
+        &self,
+        image: ImageView,
+        grids: &[Grid],
+        blurs: &[Option<f64>],
+        shift: Option<EdgeShift>,
+    ) -> Option<GridBlur> {
         let may_move = |blur: &Option<f64>| blur.is_none_or(|blur_px| blur_px > MIN_MOTION_BLUR_PX);
         let blurred = grids.iter().zip(blurs).filter(|(_, blur)| may_move(blur));
         let (grid, _) = blurred.max_by_key(|(grid, _)| grid.corners.len())?;
@@ -568,8 +574,11 @@ impl OneTiling {
         };
         let corners = grid.corners.iter().map(placed).collect();
         let [dark, bright] = self.tag_areas.insets(grid);
-        let light = GridLight::of(image, &corners, grid.kind, TagInsets { dark, bright })?;
-        light.blur.is_motion().then_some(light.blur)
+        let tiles = (grid.kind, TagInsets { dark, bright });
+        let light = |shift| GridLight::of_moved_edges(image, &corners, tiles, shift);
+        let still = light(0.0).filter(|light| light.blur.is_motion())?;
+        let moved = shift.and_then(|shift| light(shift.edges));
+        moved.is_none_or(|moved| still.misfit < moved.misfit).then_some(still.blur)
     }
 
     /// Refines the grids in an image with these optics and blurs, px; see [`Self::refine`].

@@ -26,7 +26,7 @@ use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 use super::grid_blur::{EdgeBlur, GridBlur, Spread, row};
 use crate::grid::saddle_grid::SaddleGrid;
-use deltille_core::lattice::{GridKind, Tile, Vertex};
+use deltille_core::lattice::{GridKind, ROW_HEIGHT, Tile, Vertex};
 use deltille_core::raster::ImageView;
 
 /// Number of samples across an edge.
@@ -122,6 +122,10 @@ pub(crate) struct GridLight {
     pub clipped_share: f64,
     /// Standard deviation of a sample from the model, relative to the contrast.
     pub noise: f64,
+    /// Sum of the squared residuals, relative to that of the contrasts.
+    pub misfit: f64,
+    /// Growth of dark areas on every side, in edges of tiles.
+    shift: f64,
     kind: GridKind,
     insets: TagInsets,
 }
@@ -160,12 +164,24 @@ impl GridLight {
         kind: GridKind,
         insets: TagInsets,
     ) -> Option<Self> {
+        Self::of_moved_edges(image, grid, (kind, insets), 0.0)
+    }
+
+    /// Measures a grid whose dark areas have grown by `shift` edges on every side.
+    pub(crate) fn of_moved_edges(
+        image: ImageView,
+        grid: &SaddleGrid,
+        (kind, insets): (GridKind, TagInsets),
+        shift: f64,
+    ) -> Option<Self> {
         let directions = kind.steps().len() / 2;
         let mut light = Self {
             blur: GridBlur::gaussian(&[], &[]),
             tone: 0.0,
             clipped_share: 1.0,
             noise: 0.0,
+            misfit: 0.0,
+            shift,
             kind,
             insets,
         };
@@ -220,6 +236,7 @@ impl GridLight {
         }
         // Contrasts are twice the amplitude. Residuals of the fits include blur of another shape, but hardly any noise
         // where samples are denser than pixels.
+        light.misfit = fitted.squares / fitted.power;
         let left = fitted.squares / fitted.freedom * ALONG.len() as f64;
         light.noise = left.max(fitted.variances / fitted.power).sqrt() / 2.0;
         Some(light)
@@ -424,6 +441,11 @@ impl GridLight {
             saturated += usize::from(*value >= full);
         }
         let saturated = saturated >= 2;
+        let edge_px = match self.kind {
+            GridKind::Deltille => known / ROW_HEIGHT,
+            GridKind::Checker => known,
+        };
+        let distances_px = distances_px.map(|px| px - self.shift * edge_px);
         Some(Profile { distances_px, values, normal: bright, tags_px, saturated, variance })
     }
 }

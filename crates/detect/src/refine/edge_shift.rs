@@ -48,7 +48,7 @@ pub(crate) struct EdgeShift {
     /// As a fraction of the edge length.
     pub edges: f64,
     /// Absolute value, px.
-    px: f64,
+    pub px: f64,
     kind: GridKind,
 }
 
@@ -62,14 +62,12 @@ impl EdgeShift {
     }
 }
 
-/// Returns the shift of the edges of these grids, the median; `None` if the model converges without it, or if blurred
-/// tags may displace edges as far, `by_tags_px`.
-pub(crate) fn large_shift(image: ImageView, grids: &[Grid], by_tags_px: f64) -> Option<EdgeShift> {
-    let least_px = MIN_SHIFT_PX.max(by_tags_px);
+/// Returns the shift of the edges of these grids, the median; `None` if the model converges without it.
+pub(crate) fn large_shift(image: ImageView, grids: &[Grid]) -> Option<EdgeShift> {
     let mut shifts: Vec<EdgeShift> =
         grids.iter().filter_map(|grid| shift_of_grid(image, grid)).collect();
     shifts.sort_by(|a, b| a.edges.total_cmp(&b.edges));
-    shifts.get(shifts.len() / 2).copied().filter(|shift| shift.px > least_px)
+    shifts.get(shifts.len() / 2).copied().filter(|shift| shift.px > MIN_SHIFT_PX)
 }
 
 /// Returns whether the edges of an untagged grid are straight. Dots that touch diagonally look like squares that have
@@ -211,7 +209,7 @@ mod tests {
     fn squares_are_measured_and_dots_are_not_squares() {
         for shift in [-0.15, -0.05, 0.1] {
             let (image, grid) = board(|u, v| u.abs().max(v.abs()) < 0.5 + shift);
-            let found = large_shift((&image).into(), std::slice::from_ref(&grid), 0.0).unwrap();
+            let found = large_shift((&image).into(), std::slice::from_ref(&grid)).unwrap();
             assert!((found.edges - shift).abs() < 0.03, "{shift}: {found:?}");
             assert!(has_straight_edges((&image).into(), &grid), "{shift}");
         }
