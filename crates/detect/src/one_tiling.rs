@@ -527,6 +527,7 @@ impl OneTiling {
             refiner = Cow::Owned(self.refiner.with_motion_near(motion.astigmatism()));
         } else if let Some(shift) = shift.filter(|shift| shift.px > by_tags_px) {
             refiner = Cow::Owned(self.refiner.with_ink_near(shift.edges));
+            grids.iter_mut().for_each(|grid| shift.centre(grid));
             least = shift.level(levels.len());
         }
         if matches!(refiner, Cow::Owned(_)) {

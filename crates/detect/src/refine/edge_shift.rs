@@ -5,6 +5,7 @@
 //! from this value if it is larger than its range of convergence.
 
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 
 use glam::DVec2;
 
@@ -49,10 +50,29 @@ pub(crate) struct EdgeShift {
     pub edges: f64,
     /// Absolute value, px.
     pub px: f64,
+    /// Common displacement of the corners from their edges, along the first two steps of the lattice: three edges that
+    /// have moved cross in three points, each of which may be taken for the corner.
+    offset: [f64; 2],
     kind: GridKind,
 }
 
 impl EdgeShift {
+    /// Moves the corners of a grid back between their edges.
+    pub(crate) fn centre(self, grid: &mut Grid) {
+        let steps = grid.kind.steps();
+        let before = positions(grid);
+        let along = |vertex: Vertex, step: Vertex| {
+            let ahead = before.get(&(vertex + step)).map(|next| *next - before[&vertex]);
+            ahead.or_else(|| before.get(&(vertex - step)).map(|last| before[&vertex] - *last))
+        };
+        for corner in &mut grid.corners {
+            let vertex = Vertex::new(corner.row, corner.col);
+            let way =
+                [0, 1].map(|i| along(vertex, steps[i]).unwrap_or(DVec2::ZERO) * self.offset[i]);
+            corner.move_to(corner.position() - way[0] - way[1]);
+        }
+    }
+
     /// Returns the finest level of the pyramid, of `levels`, on which the windows of the first fits extend beyond the
     /// gaps at the corners.
     pub(crate) fn level(self, levels: usize) -> usize {
@@ -89,28 +109,33 @@ struct MeasuredEdge {
     along: DVec2,
     /// Image of the direction that is perpendicular to the edge on the print, as long as the edge there.
     across: DVec2,
+    /// Its direction on the print, radians.
+    across_rad: f64,
+}
+
+fn positions(grid: &Grid) -> BTreeMap<Vertex, DVec2> {
+    let corners = grid.corners.iter();
+    corners.map(|corner| (Vertex::new(corner.row, corner.col), corner.position())).collect()
 }
 
 /// Returns edges of a grid from all over it.
 fn measured_edges(grid: &Grid) -> Vec<MeasuredEdge> {
-    let corners: BTreeMap<Vertex, DVec2> = grid
-        .corners
-        .iter()
-        .map(|corner| (Vertex::new(corner.row, corner.col), corner.position()))
-        .collect();
+    let corners = positions(grid);
     let steps = grid.kind.steps();
     let (half, quarter) = (steps.len() / 2, steps.len() / 4);
     let edge = |(vertex, from, k): (Vertex, DVec2, usize)| {
         let along = *corners.get(&(vertex + steps[k]))? - from;
         // On either side: a corner of the same tile.
-        let beside = [k + quarter, k + steps.len() - quarter]
-            .map(|side| corners.get(&(vertex + steps[side % steps.len()])));
-        let beside = beside.into_iter().flatten().next()? - from;
+        let beside = [(k + quarter, 0.5 * PI), (k + steps.len() - quarter, -0.5 * PI)]
+            .map(|(side, turn)| Some((corners.get(&(vertex + steps[side % steps.len()]))?, turn)));
+        let (beside, turn) = beside.into_iter().flatten().next()?;
+        let beside = beside - from;
+        let across_rad = PI * k as f64 / half as f64 + turn;
         let across = match grid.kind {
             GridKind::Deltille => (beside - along / 2.0) / deltille_core::lattice::ROW_HEIGHT,
             GridKind::Checker => beside,
         };
-        Some(MeasuredEdge { from, along, across })
+        Some(MeasuredEdge { from, along, across, across_rad })
     };
     let all = corners.iter().flat_map(|(&vertex, &from)| (0..half).map(move |k| (vertex, from, k)));
     let edges: Vec<MeasuredEdge> = all.filter_map(edge).collect();
@@ -119,20 +144,59 @@ fn measured_edges(grid: &Grid) -> Vec<MeasuredEdge> {
 }
 
 fn shift_of_grid(image: ImageView, grid: &Grid) -> Option<EdgeShift> {
-    let shifts: Vec<f64> = measured_edges(grid)
-        .iter()
-        .filter_map(|edge| shift_of_edge(image, edge, 0.5, grid.kind))
-        .collect();
+    let measured = |edge: &MeasuredEdge| {
+        let displacement = displacement_of_edge(image, edge, 0.5, grid.kind)?;
+        let turn = if displacement.is_backwards { PI } else { 0.0 };
+        Some((displacement.to_bright, edge.across_rad + turn))
+    };
+    let shifts: Vec<(f64, f64)> = measured_edges(grid).iter().filter_map(measured).collect();
     let edge_px = grid.edge_px()?;
     let is_measured = shifts.len() >= MIN_EDGES;
-    let edges = median(shifts).filter(|_| is_measured)?;
-    Some(EdgeShift { edges, px: edges.abs() * edge_px, kind: grid.kind })
+    let edges = median(shifts.iter().map(|(shift, _)| *shift).collect()).filter(|_| is_measured)?;
+    let offset = match grid.kind {
+        GridKind::Deltille => offset(&shifts),
+        // The edges of a line lie on both sides of it in turn.
+        GridKind::Checker => [0.0; 2],
+    };
+    Some(EdgeShift { edges, px: edges.abs() * edge_px, offset, kind: grid.kind })
 }
 
-/// Returns the displacement of the step across an edge towards its bright side, as a fraction of the edge length.
-/// It is measured at a fraction `part` of the edge.
+/// Returns the displacement of corners along the first two steps of a triangular lattice from the shifts of edges towards
+/// directions on the print, of which there are three, 120° apart.
+fn offset(shifts: &[(f64, f64)]) -> [f64; 2] {
+    let third = |rad: f64| (rad / (2.0 * PI / 3.0)).floor().rem_euclid(3.0) as usize;
+    let way: DVec2 = (0..3)
+        .map(|k| {
+            let some = || shifts.iter().filter(|(_, rad)| third(*rad) == k);
+            let direction = some().next().map_or(DVec2::ZERO, |(_, rad)| DVec2::from_angle(*rad));
+            let shift = median(some().map(|(shift, _)| *shift).collect()).unwrap_or(0.0);
+            direction * (-2.0 / 3.0 * shift)
+        })
+        .sum();
+    let second = way.y / deltille_core::lattice::ROW_HEIGHT;
+    [way.x - second / 2.0, second]
+}
+
+/// The step across an edge.
+struct Displacement {
+    /// Towards its bright side, as a fraction of the edge length.
+    to_bright: f64,
+    /// Whether the bright side is opposite to the direction across the edge.
+    is_backwards: bool,
+}
+
 fn shift_of_edge(image: ImageView, edge: &MeasuredEdge, part: f64, kind: GridKind) -> Option<f64> {
-    let MeasuredEdge { from, along, across } = *edge;
+    displacement_of_edge(image, edge, part, kind).map(|displacement| displacement.to_bright)
+}
+
+/// Returns the displacement of the step across an edge at a fraction `part` of the edge.
+fn displacement_of_edge(
+    image: ImageView,
+    edge: &MeasuredEdge,
+    part: f64,
+    kind: GridKind,
+) -> Option<Displacement> {
+    let MeasuredEdge { from, along, across, .. } = *edge;
     let middle = from + part * along;
     let reach = match kind {
         GridKind::Deltille => MAX_SHIFT * deltille_core::lattice::ROW_HEIGHT,
@@ -164,7 +228,8 @@ fn shift_of_edge(image: ImageView, edge: &MeasuredEdge, part: f64, kind: GridKin
     let &[at] = &steps[..] else { return None };
     let part = (level - profile[at - 1]) / (profile[at] - profile[at - 1]);
     let position = (at as f64 - 1.0 + part - f64::from(SAMPLES)) * reach / f64::from(SAMPLES);
-    Some(if is_bright(&profile[at]) { position } else { -position })
+    let is_backwards = !is_bright(&profile[at]);
+    Some(Displacement { to_bright: if is_backwards { -position } else { position }, is_backwards })
 }
 
 #[cfg(test)]
@@ -203,6 +268,17 @@ mod tests {
             tags: Vec::new(),
         };
         (image, grid)
+    }
+
+    /// Each of three edges seems to have moved by another distance if the corner between them is displaced.
+    #[test]
+    fn displaced_corners_are_found_by_three_edges() {
+        let displaced = DVec2::new(0.08, -0.03);
+        let directions = [-0.5, 5.0 / 6.0, 1.0 / 6.0].map(|part| PI * part);
+        let seen = directions.map(|rad| (-0.1 - DVec2::from_angle(rad).dot(displaced), rad));
+        let [first, second] = offset(&seen);
+        let found = GridKind::Deltille.position(second, first);
+        assert!(found.distance(displaced) < 1e-12, "{found}");
     }
 
     #[test]
