@@ -66,7 +66,9 @@ fn a_rendered_sheet_is_found_with_every_label_in_every_format() {
         assert!(csv.lines().nth(1).unwrap().starts_with("0,deltille,0,0,2,0,"));
 
         let overlay = deltille::photograph::read(path("out/board.overlay.jpg")).unwrap();
-        assert!(overlay.width() as u32 >= found.width);
+        // The sheet has large tiles, so the overlay is reduced.
+        let reduced = found.width as usize / overlay.width();
+        assert!((1..=4).contains(&reduced), "{reduced}");
     }
 }
 
