@@ -280,7 +280,7 @@ pub fn signed_png(mut png: Vec<u8>) -> Vec<u8> {
 }
 
 /// Adds the name of this program to a JPEG, as its first comment.
-pub fn signed_jpeg(mut jpeg: Vec<u8>) -> Vec<u8> {
+pub(crate) fn signed_jpeg(mut jpeg: Vec<u8>) -> Vec<u8> {
     let text = crate::export::GENERATOR.as_bytes();
     let length = (text.len() as u16 + 2).to_be_bytes();
     let comment = [&COMMENT[..], &length, text].concat();
