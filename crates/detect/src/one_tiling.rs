@@ -575,8 +575,8 @@ impl OneTiling {
         };
         let corners = grid.corners.iter().map(placed).collect();
         let [dark, bright] = self.tag_areas.insets(grid);
-        let tiles = (grid.kind, TagInsets { dark, bright });
-        let light = |shift| GridLight::of_moved_edges(image, &corners, tiles, shift);
+        let insets = TagInsets { dark, bright };
+        let light = |shift| GridLight::of(image, &corners, grid.kind, insets, shift);
         let still = light(0.0).filter(|light| light.blur.is_motion())?;
         let moved = shift.and_then(|shift| light(shift.edges));
         moved.is_none_or(|moved| still.misfit < moved.misfit).then_some(still.blur)

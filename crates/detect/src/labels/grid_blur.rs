@@ -4,18 +4,14 @@ use glam::DVec2;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::refine::blurred_corner::swept_edge;
+use crate::refine::optics::MIN_MOTION;
 
 /// Weight of the isotropic prior of a covariance, relative to the equation of one direction.
 const ROUND: f64 = 0.01;
 
 /// Minimum variance in any direction, relative to that of the sharpest edges. It keeps covariances positive definite.
-/// Motion may blur another direction less than all edge directions. From 0.15 to 0.6, the number of tags read under
-/// strong motion changes by 0.8 %; with 1 it is 2 % lower.
+/// Motion may blur another direction less than all edge directions.
 const SHARPEST: f64 = 0.3;
-
-/// Minimum difference of the variances along and across the motion, relative to their sum. Below it, a box changes the
-/// kurtosis by less than a fifth.
-const MIN_STRETCH: f64 = 0.25;
 
 /// First step of the search for a motion: in the logarithms of its length and of the remaining blur, and in radians.
 const FIRST_STEP: f64 = 0.2;
@@ -92,7 +88,7 @@ impl GridBlur {
     /// variances of this Gaussian blur. Returns `None` if these are nearly equal in all directions.
     pub(crate) fn as_motion(&self, cost: impl Fn(&Self) -> f64) -> Option<Self> {
         let [low, high, angle] = axes(self.covariance_px2);
-        if high - low < MIN_STRETCH * (high + low) {
+        if high - low < MIN_MOTION * (high + low) {
             return None;
         }
         // The variance of a box is a third of the square of half its length.

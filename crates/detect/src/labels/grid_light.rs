@@ -15,8 +15,8 @@
 //! Blur may spread the cells of a tag to its edges. Their mean brightness beside each edge is fitted too, as a step at
 //! the distance at which tags begin.
 //!
-//! Limitations: the whole grid has one blur. Where white is saturated, less of the edge is visible: above a share θ of white,
-//! everything is as bright as white, and S is clipped.
+//! Limitations: the whole grid has one blur. Where white is saturated, less of the edge is visible: above a share θ of
+//! white, everything is as bright as white, and S is clipped.
 
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
@@ -157,21 +157,12 @@ struct Profile {
 }
 
 impl GridLight {
-    /// Measures a grid; `None` if too little of it is visible.
+    /// Measures a grid whose dark areas have grown by `shift` edges on every side; `None` if too little of it is visible.
     pub(crate) fn of(
         image: ImageView,
         grid: &SaddleGrid,
         kind: GridKind,
         insets: TagInsets,
-    ) -> Option<Self> {
-        Self::of_moved_edges(image, grid, (kind, insets), 0.0)
-    }
-
-    /// Measures a grid whose dark areas have grown by `shift` edges on every side.
-    pub(crate) fn of_moved_edges(
-        image: ImageView,
-        grid: &SaddleGrid,
-        (kind, insets): (GridKind, TagInsets),
         shift: f64,
     ) -> Option<Self> {
         let directions = kind.steps().len() / 2;

@@ -438,8 +438,7 @@ fn parts_of(cell: &[DVec2]) -> Vec<DVec2> {
     middles.collect()
 }
 
-/// Converts a blur to tile coordinates whose unit steps
-/// along u and v are the vectors `a` and `b`, px.
+/// Converts a blur to tile coordinates whose unit steps along u and v are the vectors `a` and `b`, px.
 pub(crate) fn in_tile(blur: &GridBlur, [a, b]: [DVec2; 2], noise: f64) -> Option<TileBlur> {
     let ([xx, xy, yy], way) = (blur.covariance_px2, blur.way_px);
     let jacobian = Matrix2::new(a.x, b.x, a.y, b.y);

@@ -165,7 +165,7 @@ impl TagReader {
     ) -> Read {
         let TagInsets { dark, bright } = self.insets;
         let insets = if inverted { TagInsets { dark: bright, bright: dark } } else { self.insets };
-        let Some(light) = GridLight::of(image, grid, self.kind, insets) else {
+        let Some(light) = GridLight::of(image, grid, self.kind, insets, 0.0) else {
             return Read::default();
         };
         let dark = (self.tags_in == TagsIn::Black) != inverted;

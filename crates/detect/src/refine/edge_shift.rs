@@ -11,7 +11,7 @@ use glam::DVec2;
 
 use super::shared_optics::REACH_PX;
 use deltille_core::detection::Grid;
-use deltille_core::lattice::{GridKind, Vertex};
+use deltille_core::lattice::{GridKind, ROW_HEIGHT, Vertex};
 use deltille_core::raster::ImageView;
 use deltille_core::statistics::median;
 
@@ -132,7 +132,7 @@ fn measured_edges(grid: &Grid) -> Vec<MeasuredEdge> {
         let beside = beside - from;
         let across_rad = PI * k as f64 / half as f64 + turn;
         let across = match grid.kind {
-            GridKind::Deltille => (beside - along / 2.0) / deltille_core::lattice::ROW_HEIGHT,
+            GridKind::Deltille => (beside - along / 2.0) / ROW_HEIGHT,
             GridKind::Checker => beside,
         };
         Some(MeasuredEdge { from, along, across, across_rad })
@@ -173,7 +173,7 @@ fn offset(shifts: &[(f64, f64)]) -> [f64; 2] {
             direction * (-2.0 / 3.0 * shift)
         })
         .sum();
-    let second = way.y / deltille_core::lattice::ROW_HEIGHT;
+    let second = way.y / ROW_HEIGHT;
     [way.x - second / 2.0, second]
 }
 
@@ -199,7 +199,7 @@ fn displacement_of_edge(
     let MeasuredEdge { from, along, across, .. } = *edge;
     let middle = from + part * along;
     let reach = match kind {
-        GridKind::Deltille => MAX_SHIFT * deltille_core::lattice::ROW_HEIGHT,
+        GridKind::Deltille => MAX_SHIFT * ROW_HEIGHT,
         GridKind::Checker => MAX_SHIFT,
     };
     let inside = |place: DVec2| {

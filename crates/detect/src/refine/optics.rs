@@ -100,7 +100,7 @@ impl Default for Optics {
 }
 
 /// Minimum stretch of the blur that can be motion. Below it, motion changes the kurtosis by less than a fifth.
-pub(super) const MIN_MOTION: f64 = 0.25;
+pub(crate) const MIN_MOTION: f64 = 0.25;
 
 /// Distribution of the blur over directions: M, of trace 2, or its remainder without motion along a line.
 #[derive(Clone, Copy, Debug)]
@@ -159,9 +159,10 @@ impl Optics {
     }
 
     /// Returns these optics with a first estimate of the astigmatism of an image with motion.
-    pub(crate) fn with_motion_near(self, [e1, e2]: [f64; 2]) -> Self {
-        let long = (e1.hypot(e2) / MAX_ASTIGMATISM).max(1.0);
-        Self { astigmatism: [e1 / long, e2 / long], is_motion: true, ..self }
+    pub(crate) fn with_motion_near(&self, astigmatism: [f64; 2]) -> Self {
+        let mut params = self.vector();
+        params[TONE_PARAMS..CROSS].copy_from_slice(&astigmatism);
+        Self { is_motion: true, ..self.with(&params) }
     }
 
     /// Returns the ink spread, in edges.

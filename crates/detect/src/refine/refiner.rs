@@ -273,7 +273,7 @@ impl Refiner {
 
     /// Returns this refiner for an image with motion whose astigmatism is near this value.
     pub(crate) fn with_motion_near(&self, astigmatism: [f64; 2]) -> Self {
-        let known = self.known.clone().with_motion_near(astigmatism);
+        let known = self.known.with_motion_near(astigmatism);
         Self { known, ..self.clone() }
     }
 

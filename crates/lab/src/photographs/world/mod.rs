@@ -5,9 +5,9 @@
 //!
 //! 1. `page` is the rendered PDF of the target, with the positions of its corners.
 //! 2. `paths` extracts these positions from the operators of the PDF.
-//! 3. `background` is the table on which the page lies, and the texture of the covers.
-//! 4. `covers` are hands, cables and cups on the page.
-//! 5. `moved_edges` is its ink that has spread.
+//! 3. `moved_edges` moves the edges of the page, as ink that spreads does.
+//! 4. `background` is the table on which the page lies, and the texture of the covers.
+//! 5. `covers` are hands, cables and cups on the page.
 //! 6. `mips` contains each of these images at all sizes.
 
 pub mod background;
