@@ -12,7 +12,7 @@
 //!
 //! [`deltille_core::detection`] defines the result.
 //!
-//! `one_tiling` runs these stages, and `nothing_seen` finds the reason if they end without a grid. `detector` detects
+//! `one_tiling` runs these stages, with its `refining` for the last one, and `nothing_seen` finds the reason if they end without a grid. `detector` detects
 //! targets of both tilings with the settings of `config`. `recognise` guesses the target if none is given. `scene`
 //! checks whether several targets can be distinguished. A module imports only from modules above it in this list.
 //!
