@@ -12,9 +12,10 @@
 //!
 //! [`deltille_core::detection`] defines the result.
 //!
-//! `one_tiling` runs these stages, with its `refining` for the last one, and `nothing_seen` finds the reason if they end without a grid. `detector` detects
-//! targets of both tilings with the settings of `config`. `recognise` guesses the target if none is given. `scene`
-//! checks whether several targets can be distinguished. A module imports only from modules above it in this list.
+//! `one_tiling` runs these stages, with its `refining` for the last one, and `nothing_seen` finds the reason if they end
+//! without a grid. `detector` detects targets of both tilings with the settings of `config`. `recognise` guesses the
+//! target if none is given. `scene` checks whether several targets can be distinguished. A module imports only from
+//! modules above it in this list.
 //!
 //! Both tilings share the code: `tiling` contains the differences, and `lanes` the number of SIMD lanes.
 
