@@ -18,7 +18,7 @@ use crate::grid::untagged::tile_shape::{LARGE_INK, is_of_squares};
 use crate::labels::grid_labels::{FoundGrid, Labels, MAX_CORNERS, report_once};
 use crate::labels::placement::labeller::Budget;
 use crate::refine::clearance::{Margin, TagAreas, surroundings};
-use crate::refine::edge_shift::has_straight_edges;
+use crate::refine::edge_shift::{centre, has_straight_edges};
 use crate::refine::model::fitter::CornerFitter;
 use crate::refine::optics::Optics;
 use crate::refine::refiner::Refiner;
@@ -292,6 +292,7 @@ impl OneTiling {
         if self.is_sought() && !grids.iter().any(|found| self.is_identified(found)) {
             let found = grids_of_moved_edges(finder, pyramid, self.labels.whole());
             let mut identified = self.plausible::<N>(frame, &found, &mut Vec::new());
+            identified.iter_mut().for_each(|(grid, _)| centre(frame.image, grid));
             // Dots look like squares whose edges have moved.
             identified.retain(|found| {
                 self.is_identified(found)

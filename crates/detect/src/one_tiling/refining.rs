@@ -7,7 +7,7 @@ use super::{Frame, OneTiling};
 use crate::grid::saddle_grid::PlacedSaddle;
 use crate::labels::grid_blur::GridBlur;
 use crate::labels::grid_light::{GridLight, TagInsets};
-use crate::refine::edge_shift::{EdgeShift, large_shift};
+use crate::refine::edge_shift::{EdgeShift, centre, large_shift};
 use crate::refine::model::fitter::CornerFitter;
 use crate::refine::optics::Optics;
 use crate::refine::refine_grid::{Level, is_sampled, sharp_level};
@@ -54,7 +54,7 @@ impl OneTiling {
             refiner = Cow::Owned(self.refiner.with_motion_near(motion.astigmatism()));
         } else if let Some(shift) = shift.filter(|shift| shift.px > by_tags_px) {
             refiner = Cow::Owned(self.refiner.with_ink_near(shift.edges));
-            grids.iter_mut().for_each(|grid| shift.centre(grid));
+            grids.iter_mut().for_each(|grid| centre(frame.image, grid));
             least = shift.level(levels.len());
         }
         if matches!(refiner, Cow::Owned(_)) {

@@ -36,9 +36,22 @@ const MAX_EDGES: usize = 48;
 /// longer adjacent to their corners.
 const MAX_SHIFT: f64 = 0.3;
 
-/// Maximum median deviation of the middle of an edge from its quarters, as a fraction of its length. A disc that reaches
-/// its diagonal neighbours has 0.046.
+/// Maximum median deviation of the middle of an edge from two places beside it, as a fraction of its length. A disc that
+/// reaches its diagonal neighbours has 0.046 on a checkerboard, and one that reaches its neighbours 0.053 on a deltille
+/// board.
 const MAX_BOW: f64 = 0.025;
+
+/// Distance of these places from the ends of an edge, as a fraction of its length. A triangle whose edges have moved by
+/// 0.1 is too narrow to be measured at a quarter.
+const fn bow_place(kind: GridKind) -> f64 {
+    match kind {
+        GridKind::Deltille => 1.0 / 3.0,
+        GridKind::Checker => 0.25,
+    }
+}
+
+/// Number of times that corners are moved between their edges. Each edge depends on the corners at both ends.
+const CENTRINGS: usize = 4;
 
 /// Number of samples across an edge, to each side.
 const SAMPLES: i32 = 24;
@@ -50,29 +63,10 @@ pub(crate) struct EdgeShift {
     pub edges: f64,
     /// Absolute value, px.
     pub px: f64,
-    /// Common displacement of the corners from their edges, along the first two steps of the lattice: three edges that
-    /// have moved cross in three points, each of which may be taken for the corner.
-    offset: [f64; 2],
     kind: GridKind,
 }
 
 impl EdgeShift {
-    /// Moves the corners of a grid back between their edges.
-    pub(crate) fn centre(self, grid: &mut Grid) {
-        let steps = grid.kind.steps();
-        let before = positions(grid);
-        let along = |vertex: Vertex, step: Vertex| {
-            let ahead = before.get(&(vertex + step)).map(|next| *next - before[&vertex]);
-            ahead.or_else(|| before.get(&(vertex - step)).map(|last| before[&vertex] - *last))
-        };
-        for corner in &mut grid.corners {
-            let vertex = Vertex::new(corner.row, corner.col);
-            let way =
-                [0, 1].map(|i| along(vertex, steps[i]).unwrap_or(DVec2::ZERO) * self.offset[i]);
-            corner.move_to(corner.position() - way[0] - way[1]);
-        }
-    }
-
     /// Returns the finest level of the pyramid, of `levels`, on which the windows of the first fits extend beyond the
     /// gaps at the corners.
     pub(crate) fn level(self, levels: usize) -> usize {
@@ -90,21 +84,55 @@ pub(crate) fn large_shift(image: ImageView, grids: &[Grid]) -> Option<EdgeShift>
     shifts.get(shifts.len() / 2).copied().filter(|shift| shift.px > MIN_SHIFT_PX)
 }
 
+/// Moves the corners of a deltille grid between their edges: three edges that have moved cross in three points, each of
+/// which may be taken for the corner. The edges of a checkerboard lie on both sides of a line in turn and need none of this.
+pub(crate) fn centre(image: ImageView, grid: &mut Grid) {
+    if grid.kind == GridKind::Checker {
+        return;
+    }
+    let steps = grid.kind.steps();
+    for _ in 0..CENTRINGS {
+        let mut shifts: BTreeMap<Vertex, Vec<(f64, f64)>> = BTreeMap::new();
+        for edge in edges(grid) {
+            let shift = edge.shift(image);
+            for end in edge.ends {
+                shifts.entry(end).or_default().extend(shift);
+            }
+        }
+        let common = offset(shifts.values().flatten());
+        let before = positions(grid);
+        let along = |vertex: Vertex, step: Vertex| {
+            let ahead = before.get(&(vertex + step)).map(|next| *next - before[&vertex]);
+            ahead.or_else(|| before.get(&(vertex - step)).map(|last| before[&vertex] - *last))
+        };
+        for corner in &mut grid.corners {
+            let vertex = Vertex::new(corner.row, corner.col);
+            let here = shifts.get(&vertex).and_then(|shifts| offset(shifts.iter()));
+            let Some(offset) = here.or(common) else { continue };
+            let way = [0, 1].map(|i| along(vertex, steps[i]).unwrap_or(DVec2::ZERO) * offset[i]);
+            corner.move_to(corner.position() - way[0] - way[1]);
+        }
+    }
+}
+
 /// Returns whether the edges of an untagged grid are straight. Dots that touch diagonally look like squares that have
 /// grown or shrunk, but their outlines are round.
 pub(crate) fn has_straight_edges(image: ImageView, grid: &Grid) -> bool {
-    let bow = |edge: &MeasuredEdge| {
+    let beside = bow_place(grid.kind);
+    let bow = |edge: Edge| {
         let [first, middle, last] =
-            [0.25, 0.5, 0.75].map(|part| shift_of_edge(image, edge, part, grid.kind));
+            [beside, 0.5, 1.0 - beside].map(|part| Some(edge.displacement(image, part)?.to_bright));
         Some(middle? - (first? + last?) / 2.0)
     };
-    let bows: Vec<f64> = measured_edges(grid).iter().filter_map(bow).collect();
+    let bows: Vec<f64> = some_edges(grid).filter_map(bow).collect();
     let is_measured = bows.len() >= MIN_EDGES;
     is_measured && median(bows).is_some_and(|bow| bow.abs() < MAX_BOW)
 }
 
 /// An edge of a tile.
-struct MeasuredEdge {
+struct Edge {
+    kind: GridKind,
+    ends: [Vertex; 2],
     from: DVec2,
     along: DVec2,
     /// Image of the direction that is perpendicular to the edge on the print, as long as the edge there.
@@ -118,13 +146,14 @@ fn positions(grid: &Grid) -> BTreeMap<Vertex, DVec2> {
     corners.map(|corner| (Vertex::new(corner.row, corner.col), corner.position())).collect()
 }
 
-/// Returns edges of a grid from all over it.
-fn measured_edges(grid: &Grid) -> Vec<MeasuredEdge> {
+/// Returns all edges of a grid with a tile beside them.
+fn edges(grid: &Grid) -> Vec<Edge> {
     let corners = positions(grid);
     let steps = grid.kind.steps();
     let (half, quarter) = (steps.len() / 2, steps.len() / 4);
     let edge = |(vertex, from, k): (Vertex, DVec2, usize)| {
-        let along = *corners.get(&(vertex + steps[k]))? - from;
+        let ends = [vertex, vertex + steps[k]];
+        let along = *corners.get(&ends[1])? - from;
         // On either side: a corner of the same tile.
         let beside = [(k + quarter, 0.5 * PI), (k + steps.len() - quarter, -0.5 * PI)]
             .map(|(side, turn)| Some((corners.get(&(vertex + steps[side % steps.len()]))?, turn)));
@@ -135,46 +164,91 @@ fn measured_edges(grid: &Grid) -> Vec<MeasuredEdge> {
             GridKind::Deltille => (beside - along / 2.0) / ROW_HEIGHT,
             GridKind::Checker => beside,
         };
-        Some(MeasuredEdge { from, along, across, across_rad })
+        Some(Edge { kind: grid.kind, ends, from, along, across, across_rad })
     };
     let all = corners.iter().flat_map(|(&vertex, &from)| (0..half).map(move |k| (vertex, from, k)));
-    let edges: Vec<MeasuredEdge> = all.filter_map(edge).collect();
+    all.filter_map(edge).collect()
+}
+
+/// Returns some edges of a grid from all over it.
+fn some_edges(grid: &Grid) -> impl Iterator<Item = Edge> {
+    let edges = edges(grid);
     let every = edges.len().div_ceil(MAX_EDGES).max(1);
-    edges.into_iter().step_by(every).collect()
+    edges.into_iter().step_by(every)
 }
 
 fn shift_of_grid(image: ImageView, grid: &Grid) -> Option<EdgeShift> {
-    let measured = |edge: &MeasuredEdge| {
-        let displacement = displacement_of_edge(image, edge, 0.5, grid.kind)?;
-        let turn = if displacement.is_backwards { PI } else { 0.0 };
-        Some((displacement.to_bright, edge.across_rad + turn))
-    };
-    let shifts: Vec<(f64, f64)> = measured_edges(grid).iter().filter_map(measured).collect();
+    let shifts: Vec<f64> = some_edges(grid).filter_map(|edge| Some(edge.shift(image)?.0)).collect();
     let edge_px = grid.edge_px()?;
     let is_measured = shifts.len() >= MIN_EDGES;
-    let edges = median(shifts.iter().map(|(shift, _)| *shift).collect()).filter(|_| is_measured)?;
-    let offset = match grid.kind {
-        GridKind::Deltille => offset(&shifts),
-        // The edges of a line lie on both sides of it in turn.
-        GridKind::Checker => [0.0; 2],
-    };
-    Some(EdgeShift { edges, px: edges.abs() * edge_px, offset, kind: grid.kind })
+    let edges = median(shifts).filter(|_| is_measured)?;
+    Some(EdgeShift { edges, px: edges.abs() * edge_px, kind: grid.kind })
 }
 
 /// Returns the displacement of corners along the first two steps of a triangular lattice from the shifts of edges towards
-/// directions on the print, of which there are three, 120° apart.
-fn offset(shifts: &[(f64, f64)]) -> [f64; 2] {
-    let third = |rad: f64| (rad / (2.0 * PI / 3.0)).floor().rem_euclid(3.0) as usize;
-    let way: DVec2 = (0..3)
-        .map(|k| {
-            let some = || shifts.iter().filter(|(_, rad)| third(*rad) == k);
-            let direction = some().next().map_or(DVec2::ZERO, |(_, rad)| DVec2::from_angle(*rad));
-            let shift = median(some().map(|(shift, _)| *shift).collect()).unwrap_or(0.0);
-            direction * (-2.0 / 3.0 * shift)
-        })
-        .sum();
+/// directions on the print, of which there are three, 120° apart; `None` if one of them is missing.
+fn offset<'a>(shifts: impl Iterator<Item = &'a (f64, f64)>) -> Option<[f64; 2]> {
+    let mut by_direction: [(f64, Vec<f64>); 3] = Default::default();
+    for &(shift, rad) in shifts {
+        let third = (rad / (2.0 * PI / 3.0)).floor().rem_euclid(3.0) as usize;
+        by_direction[third].0 = rad;
+        by_direction[third].1.push(shift);
+    }
+    let mut way = DVec2::ZERO;
+    for (rad, shifts) in by_direction {
+        way -= DVec2::from_angle(rad) * (2.0 / 3.0 * median(shifts)?);
+    }
     let second = way.y / ROW_HEIGHT;
-    [way.x - second / 2.0, second]
+    Some([way.x - second / 2.0, second])
+}
+
+impl Edge {
+    /// Returns the shift of the middle of the edge, as a fraction of its length, and its direction on the print, radians.
+    fn shift(&self, image: ImageView) -> Option<(f64, f64)> {
+        let Displacement { to_bright, is_backwards } = self.displacement(image, 0.5)?;
+        Some((to_bright, self.across_rad + if is_backwards { PI } else { 0.0 }))
+    }
+
+    /// Returns the displacement of the step across the edge at a fraction `part` of it.
+    fn displacement(&self, image: ImageView, part: f64) -> Option<Displacement> {
+        let Self { kind, from, along, across, .. } = *self;
+        let middle = from + part * along;
+        let reach = match kind {
+            GridKind::Deltille => MAX_SHIFT * ROW_HEIGHT,
+            GridKind::Checker => MAX_SHIFT,
+        };
+        let inside = |place: DVec2| {
+            place.min_element() >= 0.0
+                && place.x < image.width() as f64 - 1.0
+                && place.y < image.height() as f64 - 1.0
+        };
+        let place = |i: i32| middle + across * (reach * f64::from(i) / f64::from(SAMPLES));
+        if !(inside(place(-SAMPLES)) && inside(place(SAMPLES))) {
+            return None;
+        }
+        let profile: Vec<f64> = (-SAMPLES..=SAMPLES)
+            .map(|i| {
+                let DVec2 { x, y } = place(i);
+                f64::from(image.bilinear(x, y))
+            })
+            .collect();
+        let low = profile.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = profile.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let level = (low + high) / 2.0;
+        let is_bright = |value: &f64| *value > level;
+        // Exactly one step: tags and neighbouring tiles are farther away.
+        let steps: Vec<usize> = (1..profile.len())
+            .filter(|&i| is_bright(&profile[i - 1]) != is_bright(&profile[i]))
+            .collect();
+        let &[at] = &steps[..] else { return None };
+        let part = (level - profile[at - 1]) / (profile[at] - profile[at - 1]);
+        let position = (at as f64 - 1.0 + part - f64::from(SAMPLES)) * reach / f64::from(SAMPLES);
+        let is_backwards = !is_bright(&profile[at]);
+        Some(Displacement {
+            to_bright: if is_backwards { -position } else { position },
+            is_backwards,
+        })
+    }
 }
 
 /// The step across an edge.
@@ -183,53 +257,6 @@ struct Displacement {
     to_bright: f64,
     /// Whether the bright side is opposite to the direction across the edge.
     is_backwards: bool,
-}
-
-fn shift_of_edge(image: ImageView, edge: &MeasuredEdge, part: f64, kind: GridKind) -> Option<f64> {
-    displacement_of_edge(image, edge, part, kind).map(|displacement| displacement.to_bright)
-}
-
-/// Returns the displacement of the step across an edge at a fraction `part` of the edge.
-fn displacement_of_edge(
-    image: ImageView,
-    edge: &MeasuredEdge,
-    part: f64,
-    kind: GridKind,
-) -> Option<Displacement> {
-    let MeasuredEdge { from, along, across, .. } = *edge;
-    let middle = from + part * along;
-    let reach = match kind {
-        GridKind::Deltille => MAX_SHIFT * ROW_HEIGHT,
-        GridKind::Checker => MAX_SHIFT,
-    };
-    let inside = |place: DVec2| {
-        place.min_element() >= 0.0
-            && place.x < image.width() as f64 - 1.0
-            && place.y < image.height() as f64 - 1.0
-    };
-    let place = |i: i32| middle + across * (reach * f64::from(i) / f64::from(SAMPLES));
-    if !(inside(place(-SAMPLES)) && inside(place(SAMPLES))) {
-        return None;
-    }
-    let profile: Vec<f64> = (-SAMPLES..=SAMPLES)
-        .map(|i| {
-            let DVec2 { x, y } = place(i);
-            f64::from(image.bilinear(x, y))
-        })
-        .collect();
-    let low = profile.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = profile.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let level = (low + high) / 2.0;
-    let is_bright = |value: &f64| *value > level;
-    // Exactly one step: tags and neighbouring tiles are farther away.
-    let steps: Vec<usize> = (1..profile.len())
-        .filter(|&i| is_bright(&profile[i - 1]) != is_bright(&profile[i]))
-        .collect();
-    let &[at] = &steps[..] else { return None };
-    let part = (level - profile[at - 1]) / (profile[at] - profile[at - 1]);
-    let position = (at as f64 - 1.0 + part - f64::from(SAMPLES)) * reach / f64::from(SAMPLES);
-    let is_backwards = !is_bright(&profile[at]);
-    Some(Displacement { to_bright: if is_backwards { -position } else { position }, is_backwards })
 }
 
 #[cfg(test)]
@@ -276,7 +303,7 @@ mod tests {
         let displaced = DVec2::new(0.08, -0.03);
         let directions = [-0.5, 5.0 / 6.0, 1.0 / 6.0].map(|part| PI * part);
         let seen = directions.map(|rad| (-0.1 - DVec2::from_angle(rad).dot(displaced), rad));
-        let [first, second] = offset(&seen);
+        let [first, second] = offset(seen.iter()).unwrap();
         let found = GridKind::Deltille.position(second, first);
         assert!(found.distance(displaced) < 1e-12, "{found}");
     }

@@ -2,7 +2,7 @@
 //!
 //! Dark tiles that meet diagonally at a corner then overlap or leave a gap. A fine level of the pyramid shows the gap
 //! instead of a corner. On a coarse level it is small compared with the blur, so the corner is visible, but the gap
-//! still shifts the brightness of the centre. A minimum or maximum over 3 × 3 pixels moves all edges back by a pixel.
+//! still shifts the brightness of the centre. A minimum or maximum over neighbours moves all edges back by a pixel.
 //! On the level on which a tile has 12 to 24 px, two pixels are 8 to 16 % of the tile, and corners tolerate another pixel.
 //!
 //! ```text
@@ -21,12 +21,10 @@ use crate::grid::links::link::has_chain;
 use crate::grid::outline::WholeBoard;
 use crate::grid::saddle_grid::SaddleGrid;
 use crate::levels::MIN_LEVEL_SIDE;
+use crate::tiling::CHECKER;
 use deltille_core::raster::{Gray, Pyramid};
 
-/// Maximum displacement of the edges, px of a level.
-const MAX_STEPS: usize = 2;
-
-/// Returns the grids of the level and the displacement that show the largest grid, in px of level 0.
+/// Returns the grids of the level and the displacement that show the whole board or the largest grid, in px of level 0.
 pub(crate) fn grids_of_moved_edges<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
@@ -47,13 +45,17 @@ pub(crate) fn grids_of_moved_edges<const N: usize>(
         let image = &coarse.levels()[0];
         let ways: [&(dyn Fn() -> Vec<View> + Sync); 3] = [
             &|| vec![seen(image)],
-            &|| in_steps(image, i16::min).iter().map(seen).collect(),
-            &|| in_steps(image, i16::max).iter().map(seen).collect(),
+            &|| in_steps::<N>(image, i16::min).iter().map(seen).collect(),
+            &|| in_steps::<N>(image, i16::max).iter().map(seen).collect(),
         ];
         ways.into_par_iter().flat_map_iter(|way| way()).collect()
     };
     let (mut best, mut may_be_finer) = (Vec::new(), true);
-    let size = |grids: &[SaddleGrid]| grids.first().map_or(0, |grid| grid.len());
+    // A larger one than the whole board has false corners.
+    let worth = |grids: &[SaddleGrid]| {
+        let is_whole = |grid| whole.is_some_and(|whole| whole.is_shown_by(grid));
+        grids.first().map_or((false, 0), |grid| (is_whole(grid), grid.len()))
+    };
     for level in (1..pyramid.levels().len()).rev() {
         // The finest level takes most of the time. On the next one, the tiles of its boards have half as many pixels, and
         // some of their corners are already joined.
@@ -63,8 +65,8 @@ pub(crate) fn grids_of_moved_edges<const N: usize>(
         let views = of_level(level);
         may_be_finer = views.iter().any(|view| view.has_chain);
         // Of equally good ones, the finest level.
-        let largest = views.into_iter().map(|view| view.grids).max_by_key(|grids| size(grids));
-        best = largest.filter(|grids| size(grids) >= size(&best)).unwrap_or(best);
+        let largest = views.into_iter().map(|view| view.grids).max_by_key(|grids| worth(grids));
+        best = largest.filter(|grids| worth(grids) >= worth(&best)).unwrap_or(best);
     }
     best
 }
@@ -76,14 +78,31 @@ struct View {
     has_chain: bool,
 }
 
-/// Returns images whose edges have been moved by one and by more pixels.
-fn in_steps(image: &Gray<i16>, filter: impl Fn(i16, i16) -> i16 + Copy) -> Vec<Gray<i16>> {
-    let next = |image: &Gray<i16>| Some(with_moved_edges(image, filter));
-    std::iter::successors(next(image), next).take(MAX_STEPS).collect()
+/// Returns images whose edges have been moved by one and by two pixels.
+fn in_steps<const N: usize>(
+    image: &Gray<i16>,
+    filter: impl Fn(i16, i16) -> i16 + Copy,
+) -> [Gray<i16>; 2] {
+    // The gap between two squares is closed along its diagonal. Around a triangle, all edges have to move equally.
+    let first = if N == CHECKER { Neighbours::Eight } else { Neighbours::Four };
+    let by_one = with_moved_edges(image, first, filter);
+    let by_two = with_moved_edges(&by_one, Neighbours::Eight, filter);
+    [by_one, by_two]
 }
 
-/// Returns an image with the minimum or maximum over 3 × 3 pixels at each pixel.
-fn with_moved_edges(image: &Gray<i16>, filter: impl Fn(i16, i16) -> i16 + Copy) -> Gray<i16> {
+/// The pixels around one that replace it.
+#[derive(PartialEq)]
+enum Neighbours {
+    Four,
+    Eight,
+}
+
+/// Returns an image with the minimum or maximum over its neighbours at each pixel.
+fn with_moved_edges(
+    image: &Gray<i16>,
+    neighbours: Neighbours,
+    filter: impl Fn(i16, i16) -> i16 + Copy,
+) -> Gray<i16> {
     let height = image.height();
     let mut along = image.clone();
     for y in 0..height {
@@ -96,8 +115,9 @@ fn with_moved_edges(image: &Gray<i16>, filter: impl Fn(i16, i16) -> i16 + Copy) 
         }
     }
     let mut both = along.clone();
+    let beside = if neighbours == Neighbours::Four { image } else { &along };
     for y in 0..height {
-        let [above, below] = [along.row(y.saturating_sub(1)), along.row((y + 1).min(height - 1))];
+        let [above, below] = [beside.row(y.saturating_sub(1)), beside.row((y + 1).min(height - 1))];
         let row = both.row_mut(y);
         for (out, (&above, &below)) in row.iter_mut().zip(above.iter().zip(below)) {
             *out = filter(filter(above, *out), below);
