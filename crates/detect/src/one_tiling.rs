@@ -326,7 +326,7 @@ impl OneTiling {
         Found { grids, optics, left_out, saddles: saddles.len() }
     }
 
-    /// Returns whether grids may lack corners because their tags are too near: none is labelled, or one that is does not
+    /// Returns whether grids may lack corners because their tags are too near: none is identified, or one that is does not
     /// show a whole board, and the circle on which corners are searched for reaches the tags.
     fn may_lack_corners(&self, grids: &Judged) -> bool {
         let is_near = |grid: &Grid| {
@@ -335,11 +335,11 @@ impl OneTiling {
                 around.iter().map(|around| around.clear_square_px(Margin::of(0.0))).collect();
             median(clear).is_some_and(|clear_px| clear_px < ring::RADIUS as f64)
         };
-        let mut labelled = grids.iter().map(|(grid, _)| grid).filter(|grid| is_labelled(grid));
+        let mut identified = grids.iter().filter(|found| self.is_identified(found));
         let whole = self.labels.whole().map_or(usize::MAX, |whole| whole.corners());
-        match labelled.clone().count() {
+        match identified.clone().count() {
             0 => true,
-            _ => labelled.any(|grid| grid.corners.len() < whole && is_near(grid)),
+            _ => identified.any(|(grid, _)| grid.corners.len() < whole && is_near(grid)),
         }
     }
 

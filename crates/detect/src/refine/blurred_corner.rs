@@ -16,24 +16,13 @@
 //!     f = erf(h₁/√2) erf(h₂/√2) + 2/π ∫₀^{asin ρ} exp(−(h₁² + h₂² − 2 h₁h₂ sin φ)/(2 cos² φ)) dφ
 //! ```
 //!
-//! Ink or blooming moves all edges into the bright or the dark tiles. Three lines then do not meet. Between them is a
-//! triangle in which the alternating sum is ±3 instead of ±1. With F(i, j) = E[sᵢ sⱼ], the indicator of the triangle
-//! is (1 − F(1,2) + F(1,3) − F(2,3))/4, since one of the eight combinations of three half-planes is empty. With two
-//! edges, both halves of each line move in opposite directions by d₁ and d₂, and dark tiles overlap or part:
-//!
-//! ```text
-//!     f = ½ [F(h₁ + d₁, h₂ ± d₂) + F(h₁ − d₁, h₂ ∓ d₂)] − ½ Σ [erf((hₖ + dₖ)/√2) − erf((hₖ − dₖ)/√2)]
-//! ```
-//!
-//! with the upper sign where areas of f = −1 have grown.
-//!
 //! All computations are straight-line single precision, so that the compiler can vectorise over pixels. Errors are
 //! below 3·10⁻⁶ (tests).
 
 use std::f32::consts::{FRAC_1_SQRT_2, FRAC_2_PI, LN_2, LOG2_E};
 
 /// √(2/π): the slope of erf(h/√2) at 0.
-const SLOPE: f32 = 0.797_884_6;
+pub(super) const SLOPE: f32 = 0.797_884_6;
 
 /// Nodes and weights of the Gauss–Legendre rule of six points on −1 … 1. They suffice for 10⁻⁶ up to |ρ| = 0.9, edges
 /// 25° apart.
@@ -141,75 +130,6 @@ impl<const K: usize, P: Pattern<K>> Pattern<K> for Haloed<P> {
     }
 }
 
-/// Three displaced edges, with the triangle between them.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Inked<P> {
-    /// The edges without the triangle.
-    pub edges: P,
-    /// The pairs of edges.
-    pub pairs: [Orthant<6>; PAIRS.len()],
-    /// 1 if areas of f = −1 have grown, −1 if they have shrunk.
-    pub sign: f32,
-    /// 1/√(1 + w²/3) for half of the motion w across each edge: motion widens the blur.
-    pub narrower: [f32; 3],
-}
-
-impl<P: Pattern<3>> Pattern<3> for Inked<P> {
-    const CORRELATED: usize = PAIRS.len();
-
-    #[inline(always)]
-    fn at(&self, h: [f32; 3]) -> Shade<3> {
-        let mut shade = self.edges.at(h);
-        let weight = 0.5 * self.sign;
-        shade.f += weight;
-        for (p, [i, j]) in PAIRS.into_iter().enumerate() {
-            // Signs of the triangle's sides: − + −, or + − +.
-            let weight = if p == 1 { weight } else { -weight };
-            let both = self.pairs[p].checker([h[i] * self.narrower[i], h[j] * self.narrower[j]]);
-            shade.f += weight * both.f;
-            shade.slopes[i] += weight * both.slopes[0] * self.narrower[i];
-            shade.slopes[j] += weight * both.slopes[1] * self.narrower[j];
-            shade.correlations[p] = weight * both.correlations[0];
-        }
-        shade
-    }
-}
-
-/// Two edges whose halves are displaced in opposite directions.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Parted<P> {
-    /// The pattern without displacement.
-    pub edges: P,
-    /// Displacements of the edges into areas of f = 1, in units of the blur.
-    pub by: [f32; 2],
-}
-
-impl<P: Pattern<2>> Pattern<2> for Parted<P> {
-    const CORRELATED: usize = 1;
-
-    #[inline(always)]
-    fn at(&self, h: [f32; 2]) -> Shade<2> {
-        let [d1, d2] = self.by;
-        let sign = if d1 + d2 < 0.0 { -1.0 } else { 1.0 };
-        let ahead = self.edges.at([h[0] + d1, h[1] + sign * d2]);
-        let behind = self.edges.at([h[0] - d1, h[1] - sign * d2]);
-        let (mut f, mut slopes) = (0.5 * (ahead.f + behind.f), mean(ahead.slopes, behind.slopes));
-        let mut shifts = [
-            0.5 * (ahead.slopes[0] - behind.slopes[0]),
-            0.5 * sign * (ahead.slopes[1] - behind.slopes[1]),
-        ];
-        for k in 0..2 {
-            let [there, back] = [h[k] + self.by[k], h[k] - self.by[k]];
-            let [steep, flat] = [SLOPE * bell(there), SLOPE * bell(back)];
-            f -= 0.5 * (erf_sqrt_half(there) - erf_sqrt_half(back));
-            slopes[k] -= 0.5 * (steep - flat);
-            shifts[k] -= 0.5 * (steep + flat);
-        }
-        let correlation = 0.5 * (ahead.correlations[0] + behind.correlations[0]);
-        Shade { f, slopes, correlations: [correlation, 0.0, 0.0], shifts, ..ahead }
-    }
-}
-
 /// Minimum length of a box to each side, in units of the blur. It widens the blur by 0.2 %.
 const MIN_WAY: f32 = 0.1;
 
@@ -314,7 +234,7 @@ impl<P: Pattern<2>> SweptChecker<P> {
 }
 
 #[inline(always)]
-fn mean<const N: usize>(a: [f32; N], b: [f32; N]) -> [f32; N] {
+pub(super) fn mean<const N: usize>(a: [f32; N], b: [f32; N]) -> [f32; N] {
     std::array::from_fn(|i| 0.5 * (a[i] + b[i]))
 }
 
@@ -433,7 +353,7 @@ pub(crate) fn edge_slope(h: f32) -> f32 {
 
 /// exp(−h²/2).
 #[inline(always)]
-fn bell(h: f32) -> f32 {
+pub(super) fn bell(h: f32) -> f32 {
     exp_negative(-0.5 * h * h)
 }
 
@@ -450,7 +370,7 @@ pub(crate) fn erf_sqrt_half(h: f32) -> f32 {
 /// exp(x) for x ≤ 0, with a relative error of 3·10⁻⁷. The result is limited to 2⁻⁶⁰, so that no product of two is a
 /// subnormal number, which processors handle slowly.
 #[inline(always)]
-fn exp_negative(x: f32) -> f32 {
+pub(super) fn exp_negative(x: f32) -> f32 {
     /// 1.5·2²³: adding it rounds to an integer, which then fills the low bits.
     const ROUND: f32 = 12_582_912.0;
     let y = (x * LOG2_E).max(-60.0);
@@ -548,73 +468,6 @@ mod tests {
             let units = |v: [f32; 2]| [v[0] / spread[0], v[1] / spread[1]];
             let four = SweptChecker { pattern, way: units(way) }.at(units(h)).f;
             assert!((four - two).abs() < 2e-3, "{h:?} {way:?}: {four} or {two}");
-        }
-    }
-
-    /// Integrates displaced edges over a Gaussian blur, and compares them with the patterns and their derivatives.
-    #[test]
-    fn displaced_edges_are_means_over_the_blur() {
-        const STEPS: i32 = 160;
-        let node = |i: i32| (f64::from(i) + 0.5) * 10.0 / f64::from(STEPS) - 5.0;
-        let mean = |of: &dyn Fn([f64; 2]) -> f64| {
-            let (mut sum, mut total) = (0.0, 0.0);
-            for i in 0..STEPS * STEPS {
-                let z = [node(i % STEPS), node(i / STEPS)];
-                let weight = (-0.5 * (z[0] * z[0] + z[1] * z[1])).exp();
-                sum += weight * of(z);
-                total += weight;
-            }
-            sum / total
-        };
-        for case in 0..60 {
-            let angles = [0.3, 1.2 + 0.01 * f64::from(case % 7), 2.3];
-            let normals = angles.map(|angle: f64| [-angle.sin(), angle.cos()]);
-            let rho =
-                |i: usize, j: usize| normals[i][0] * normals[j][0] + normals[i][1] * normals[j][1];
-            let place = [f64::from(case % 10) * 0.5 - 2.2, f64::from(case / 6) * 0.5 - 2.4];
-            let far = |k: usize, z: [f64; 2]| {
-                (place[0] + z[0]) * normals[k][0] + (place[1] + z[1]) * normals[k][1]
-            };
-            let h = [0, 1, 2].map(|k| far(k, [0.0; 2]));
-            let sign = if case % 2 == 0 { 1.0 } else { -1.0 };
-            let by: [f64; 2] = [1.1 * sign, 0.7 * sign];
-            // Areas of f = −1 are grown, or those of f = 1.
-            let two = mean(&|z| {
-                let [a, b] = [far(0, z), far(1, z)];
-                let grown = |x: f64, y: f64| x > -by[0].abs() && y > -by[1].abs();
-                match sign > 0.0 {
-                    true if grown(a, -b) || grown(-a, b) => -1.0,
-                    true => 1.0,
-                    false if grown(a, b) || grown(-a, -b) => 1.0,
-                    false => -1.0,
-                }
-            });
-            let parted =
-                |h: [f32; 2], by: [f32; 2]| Parted { edges: Orthant::new(rho(0, 1)), by }.at(h);
-            let (h2, by2) = ([h[0] as f32, h[1] as f32], by.map(|by| by as f32));
-            let found = parted(h2, by2);
-            assert!((f64::from(found.f) - two).abs() < 4e-3, "{case}: {} or {two}", found.f);
-            for k in 0..2 {
-                let step = |to: [f32; 2], s: f32| {
-                    std::array::from_fn(|j| if j == k { to[j] + s } else { to[j] })
-                };
-                let by_h = (parted(step(h2, 0.01), by2).f - parted(step(h2, -0.01), by2).f) / 0.02;
-                let by_d = (parted(h2, step(by2, 0.01)).f - parted(h2, step(by2, -0.01)).f) / 0.02;
-                assert!((by_h - found.slopes[k]).abs() < 3e-4, "{case}: {by_h}");
-                assert!((by_d - found.shifts[k]).abs() < 3e-4, "{case}: {by_d}");
-            }
-            let off = [1.1 * sign, -0.8 * sign, 0.9 * sign];
-            let three = mean(&|z| {
-                let sum: f64 = [0, 1, 2]
-                    .map(|k| (far(k, z) - off[k]).signum() * if k == 1 { -1.0 } else { 1.0 })
-                    .iter()
-                    .sum();
-                sum.clamp(-1.0, 1.0)
-            });
-            let pairs = PAIRS.map(|[i, j]| Orthant::new(rho(i, j)));
-            let inked = Inked { edges: Deltille, pairs, sign: sign as f32, narrower: [1.0; 3] };
-            let found = inked.at([0, 1, 2].map(|k| (h[k] - off[k]) as f32)).f;
-            assert!((f64::from(found) - three).abs() < 4e-3, "{case}: {found} or {three}");
         }
     }
 

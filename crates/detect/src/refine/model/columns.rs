@@ -10,6 +10,7 @@ use crate::refine::blurred_corner::{
     Deltille, FEW_NODES_RHO, Orthant, PAIRS, Pattern, Shade, SweptChecker, SweptDeltille,
     edge_slope,
 };
+use crate::refine::displaced_edges::WithSpot;
 use deltille_core::detection::TONE_PARAMS;
 
 /// First of the rows after the residual, for the parameters that all corners share: amplitude · (1
@@ -65,7 +66,12 @@ pub(super) fn fill_columns<const K: usize, const JOINT: bool>(
                 let way = std::array::from_fn(|k| way.get(k).copied().unwrap_or(0.0));
                 fill_swept_deltille::<K, JOINT>(columns, shown, window, corner, look, way);
             }
-            (None, true) => fill_inked_deltille::<K, JOINT>(columns, shown, window, corner, look),
+            (None, true) => match look.with_spot(Deltille, 1.0) {
+                Some(near) => {
+                    fill_spot_deltille::<K, JOINT>(columns, shown, window, corner, look, near);
+                }
+                None => fill_inked_deltille::<K, JOINT>(columns, shown, window, corner, look),
+            },
             (None, false) => fill_deltille::<K, JOINT>(columns, shown, window, corner, look),
         }
     }
@@ -182,11 +188,29 @@ fn fill_inked_deltille<const C: usize, const JOINT: bool>(
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
-    let inked = look.inked(Deltille);
+    let inked = look.with_triangle(Deltille);
     if JOINT || look.has_halo() {
         fill::<3, C, JOINT, _>(columns, shown, window, corner, look, look.haloed(inked));
     } else {
         fill::<3, C, JOINT, _>(columns, shown, window, corner, look, inked);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn fill_spot_deltille<const C: usize, const JOINT: bool>(
+    columns: &mut Columns,
+    shown: Shown,
+    window: &Window,
+    corner: &Corner<C>,
+    look: &Look<C>,
+    near: WithSpot<Deltille>,
+) {
+    if JOINT || look.has_halo() {
+        // The halo is wider than the blur, so its spot is relatively smaller.
+        let spot = |by: f32| look.with_spot(Deltille, by).unwrap_or(near);
+        fill::<3, C, JOINT, _>(columns, shown, window, corner, look, look.haloed_of(spot));
+    } else {
+        fill::<3, C, JOINT, _>(columns, shown, window, corner, look, near);
     }
 }
 
@@ -201,7 +225,7 @@ fn fill_swept_deltille<const C: usize, const JOINT: bool>(
 ) {
     let swept = |by: f32| SweptDeltille::new(way.map(|way| way * by));
     if look.is_inked() {
-        let pattern = look.inked(look.haloed_of(swept));
+        let pattern = look.with_triangle(look.haloed_of(swept));
         fill::<3, C, JOINT, _>(columns, shown, window, corner, look, pattern);
     } else if JOINT || look.has_halo() {
         fill::<3, C, JOINT, _>(columns, shown, window, corner, look, look.haloed_of(swept));

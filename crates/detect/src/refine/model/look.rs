@@ -1,7 +1,8 @@
 //! Effect of the optics on a corner: the same for all of its pixels, and computed once.
 
 use super::corner::Corner;
-use crate::refine::blurred_corner::{Haloed, Inked, Orthant, PAIRS, Parted};
+use crate::refine::blurred_corner::{Haloed, Orthant, PAIRS};
+use crate::refine::displaced_edges::{Parted, WithSpot, WithTriangle};
 use crate::refine::optics::{INK_UNIT, Optics};
 use deltille_core::detection::Piece;
 
@@ -150,8 +151,15 @@ impl<const K: usize> Look<K> {
         self.displaced.iter().any(|d| *d != 0.0)
     }
 
+    /// Returns these three edges without motion, with the triangle between them if it is small. All lengths are multiplied
+    /// by a factor.
+    pub(super) fn with_spot<P>(&self, edges: P, factor: f32) -> Option<WithSpot<P>> {
+        let moved = [0, 1, 2].map(|k| self.displaced[k.min(K - 1)] * f64::from(factor));
+        WithSpot::new(edges, self.correlations.map(|of| of.rho), moved)
+    }
+
     /// Returns these three edges with the triangle between them.
-    pub(super) fn inked<P>(&self, edges: P) -> Inked<P> {
+    pub(super) fn with_triangle<P>(&self, edges: P) -> WithTriangle<P> {
         let way = |k: usize| self.way.map_or(0.0, |way| way[k.min(K - 1)]);
         // A box of half length w has the variance w²/3.
         let narrower = [0, 1, 2].map(|k| 1.0 / (1.0 + way(k) * way(k) / 3.0).sqrt());
@@ -160,7 +168,7 @@ impl<const K: usize> Look<K> {
             let rho = self.correlations[p].rho as f32 + way(i) * way(j) / 3.0;
             Orthant::new(f64::from(rho * narrower[i] * narrower[j]))
         });
-        Inked { edges, pairs, sign: self.displaced[0].signum() as f32, narrower }
+        WithTriangle { edges, pairs, sign: self.displaced[0].signum() as f32, narrower }
     }
 
     /// Returns these two edges with their halves displaced, and all lengths multiplied by a factor.
