@@ -14,7 +14,7 @@
 //! The ratio is at most the number of random words. So the noise is assumed to be so large that a tile determines at
 //! most [`MAX_INFORMATION`]. Tags whose single cells determine more than that are read cell by cell.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use rand::{RngCore, SeedableRng};
@@ -70,13 +70,16 @@ pub(crate) struct JointModel {
 impl JointModel {
     /// Creates the model from ½ W by sample, and the effects of errors of the grey levels with a standard deviation of
     /// 1, for samples of this variance. Returns `None` if single cells determine more, `of_cells` nats.
-    pub(super) fn new(
+    pub(super) fn new<'a>(
         half_shares: &DMatrix<f64>,
         levels: &DMatrix<f64>,
         variance: f64,
         of_cells: f64,
-        random: &RandomWords,
+        random: impl FnOnce() -> &'a RandomWords,
     ) -> Option<Self> {
+        if of_cells > MAX_INFORMATION {
+            return None;
+        }
         // R⁻¹ by the Woodbury identity: the errors of the grey levels are few.
         let among =
             levels.tr_mul(levels) / variance + DMatrix::identity(levels.ncols(), levels.ncols());
@@ -104,7 +107,7 @@ impl JointModel {
             m.row_iter().map(|row| row.iter().map(|&v| v as f32).collect()).collect()
         };
         let (matrix, gain) = (rows(&matrix), rows(&gain));
-        let mut squares = vec![0.0; COUNT];
+        let (random, mut squares) = (random(), vec![0.0; COUNT]);
         for (row, signs) in matrix.iter().zip(&random.signs) {
             let sums = random.sums(row);
             let terms = sums.iter().zip(signs).map(|(sum, sign)| 0.5 * sum * sign);
@@ -122,14 +125,14 @@ impl JointModel {
     }
 
     /// Returns the odds of all words, given the samples minus their middle.
-    pub(super) fn odds(self: &Rc<Self>, off_middle: &[f32], random: &RandomWords) -> JointOdds {
+    pub(super) fn odds(self: &Arc<Self>, off_middle: &[f32], random: &RandomWords) -> JointOdds {
         let product = |row: &Vec<f32>| row.iter().zip(off_middle).map(|(g, off)| g * off).sum();
         let linear: Vec<f32> = self.gain.iter().map(product).collect();
         let sums = random.sums(&linear);
         let likelihoods = || sums.iter().zip(&self.random).map(|(sum, square)| sum - square);
         let most = likelihoods().fold(f32::NEG_INFINITY, f32::max);
         let sum = likelihoods().map(|l| (l - most).exp()).sum::<f32>();
-        JointOdds { model: Rc::clone(self), linear, of_random: most + sum.ln() }
+        JointOdds { model: Arc::clone(self), linear, of_random: most + sum.ln() }
     }
 }
 
@@ -137,7 +140,7 @@ impl JointModel {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct JointOdds {
     /// The model, which tiles under the same blur share.
-    pub model: Rc<JointModel>,
+    pub model: Arc<JointModel>,
     /// b, by bit.
     pub linear: Vec<f32>,
     /// ln Σ L of the random words.
@@ -176,14 +179,14 @@ mod tests {
     const NOISE: f64 = 0.05;
 
     /// A row of cells under a blur of this many cells.
-    fn model(blur: f64, random: &RandomWords) -> (DMatrix<f64>, Option<Rc<JointModel>>) {
+    fn model(blur: f64, random: &RandomWords) -> (DMatrix<f64>, Option<Arc<JointModel>>) {
         let off = |i: usize, bit: usize| i as f64 * BITS as f64 / SAMPLES as f64 - bit as f64;
         let shares = DMatrix::from_fn(SAMPLES, BITS, |i, bit| {
             0.2 / blur * (-0.5 * (off(i, bit) / blur).powi(2)).exp()
         });
         let level = DMatrix::from_element(SAMPLES, 1, 0.15);
-        let model = JointModel::new(&shares, &level, NOISE * NOISE, 3.0, random);
-        (shares, model.map(Rc::new))
+        let model = JointModel::new(&shares, &level, NOISE * NOISE, 3.0, || random);
+        (shares, model.map(Arc::new))
     }
 
     /// The mean of e^Λ over all words is 1. A word that is shown has more evidence than 99 of 100 others, although none of

@@ -12,14 +12,13 @@
 //! is the posterior mean of s, v its variance, and m/v half the log-odds that the cell is white. Errors of the grey
 //! levels are linear over the tile. They are additional unknowns, solved together with the cells.
 //!
-//! The shares depend only on the blur in tile coordinates, which neighbouring tiles share. So K is computed once, and
-//! each tile costs one multiplication.
+//! The shares depend only on the blur in tile coordinates, which neighbouring tiles share, and so do successive images.
+//! So K is computed once for each blur, and each tile costs one multiplication.
 //!
 //! Limitations: cells are treated as independent, although wide blur correlates their errors; see `joint_cells`.
 
 use std::collections::BTreeMap;
-use std::rc::Rc;
-use std::sync::OnceLock;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use glam::DVec2;
 use nalgebra::{DMatrix, Matrix2, Vector2};
@@ -44,6 +43,12 @@ const CORRELATION_STEP: f64 = 0.2;
 
 /// Step between distinct motions, bit-widths. It changes the standard deviation of the blur as little as the steps above.
 const WAY_STEP_BITS: f64 = 0.25;
+
+/// Step between distinct variances of samples, as a logarithm: a tenth of their standard deviation.
+const LOG_NOISE_STEP: f64 = 0.2;
+
+/// Number of mixings that are kept; one takes 20 to 100 kB.
+const MAX_MIXINGS: usize = 256;
 
 /// Half of a motion, in σ of the blur, that is ignored: it adds 0.3 % to the blur.
 const MIN_WAY_SIGMAS: f64 = 0.1;
@@ -107,6 +112,8 @@ pub(crate) struct CellModel {
     parts: Vec<(usize, DVec2)>,
     /// Words with which those of blurred tags are compared.
     random: OnceLock<RandomWords>,
+    /// Mixings that were computed before, by quantised blur.
+    mixings: Arc<Mutex<BTreeMap<[i32; 6], Arc<Mixing>>>>,
 }
 
 /// Blur in tile coordinates, and noise.
@@ -137,11 +144,8 @@ pub(crate) struct Mixing {
     /// Standard deviation of each predicted sample if nothing is known about the cells.
     spread: Vec<f32>,
     /// Joint likelihood of the cells, if they are not known one by one.
-    joint: Option<Rc<JointModel>>,
+    joint: Option<Arc<JointModel>>,
 }
-
-/// Cache of mixings, by quantised blur.
-pub(crate) type Mixings = BTreeMap<[i32; 5], Rc<Mixing>>;
 
 /// A sample of a tile on the scale of black 0 and white 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -177,6 +181,7 @@ impl CellModel {
             points: points.collect(),
             parts: parts.collect(),
             random: OnceLock::new(),
+            mixings: Arc::default(),
         }
     }
 
@@ -214,9 +219,9 @@ impl CellModel {
         Some(joint.odds(&off_middle?, self.random()))
     }
 
-    /// Returns the mixing for a blur, from the cache `known` if it contains nearly the same blur. Returns `None` if the
-    /// equations cannot be solved.
-    pub(crate) fn mixing(&self, blur: TileBlur, known: &mut Mixings) -> Option<Rc<Mixing>> {
+    /// Returns the mixing for a blur, rounded to a few per cent so that equal ones recur. Returns `None` if the equations
+    /// cannot be solved.
+    pub(crate) fn mixing(&self, blur: TileBlur) -> Option<Arc<Mixing>> {
         let [uu, uv, vv] = blur.covariance;
         // Isotropic on the print. Steps along u and v are 60° apart, so uu = vv = 1/sin² 60° and uv = −cos 60° of that.
         let [puu, puv] = match self.kind {
@@ -225,28 +230,41 @@ impl CellModel {
         };
         let part = PART_BLUR_BITS * PART_BLUR_BITS;
         let (uu, uv, vv) = (uu + part * puu, uv + part * puv, vv + part * puu);
+        // The noise of samples that are denser than pixels is correlated.
+        let samples_px2 =
+            self.points.len() as f64 / (self.bits as f64 * self.cell_area() * blur.area_px2);
+        let variance = NOISE_WEIGHT * blur.noise * blur.noise * (SAMPLE_PX2 * samples_px2).max(1.0)
+            + MODEL_ERROR * MODEL_ERROR * samples_px2.max(1.0);
         let key = [
             (uu.ln() / LOG_VARIANCE_STEP).round() as i32,
             (vv.ln() / LOG_VARIANCE_STEP).round() as i32,
             (uv / (uu * vv).sqrt() / CORRELATION_STEP).round() as i32,
             (blur.way.x / WAY_STEP_BITS).round() as i32,
             (blur.way.y / WAY_STEP_BITS).round() as i32,
+            (variance.ln() / LOG_NOISE_STEP).round() as i32,
         ];
-        if let Some(mixing) = known.get(&key) {
-            return Some(Rc::clone(mixing));
+        let known = || self.mixings.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(mixing) = known().get(&key) {
+            return Some(Arc::clone(mixing));
         }
         let [uu, vv] = [key[0], key[1]].map(|k| (f64::from(k) * LOG_VARIANCE_STEP).exp());
         let correlation =
             (f64::from(key[2]) * CORRELATION_STEP).clamp(-MAX_CORRELATION, MAX_CORRELATION);
         let covariance = [uu, correlation * (uu * vv).sqrt(), vv];
         let way = WAY_STEP_BITS * DVec2::new(f64::from(key[3]), f64::from(key[4]));
-        let mixing = Rc::new(self.make(TileBlur { covariance, way, ..blur })?);
-        known.insert(key, Rc::clone(&mixing));
+        let variance = (f64::from(key[5]) * LOG_NOISE_STEP).exp();
+        let mixing = Arc::new(self.make(covariance, way, variance)?);
+        let mut known = known();
+        if known.len() >= MAX_MIXINGS {
+            known.clear();
+        }
+        known.insert(key, Arc::clone(&mixing));
         Some(mixing)
     }
 
-    fn make(&self, blur: TileBlur) -> Option<Mixing> {
-        let TileBlur { covariance: [uu, uv, vv], way, area_px2, noise } = blur;
+    /// Computes the mixing for a blur with this covariance and half of a motion, and for samples of this variance.
+    fn make(&self, covariance: [f64; 3], way: DVec2, variance: f64) -> Option<Mixing> {
+        let [uu, uv, vv] = covariance;
         let determinant = uu * vv - uv * uv;
         if determinant <= 0.0 || determinant.is_nan() {
             return None;
@@ -277,11 +295,8 @@ impl CellModel {
             design[(i, bits + 1)] = SLOPE_ERROR * off_middle.x;
             design[(i, bits + 2)] = SLOPE_ERROR * off_middle.y;
         }
-        let white: Vec<f64> = self.points.iter().map(|&p| self.white_beyond(p, &blur)).collect();
-        // The noise of samples that are denser than pixels is correlated.
-        let samples_px2 = n as f64 / (bits as f64 * self.cell_area() * area_px2);
-        let variance = NOISE_WEIGHT * noise * noise * (SAMPLE_PX2 * samples_px2).max(1.0)
-            + MODEL_ERROR * MODEL_ERROR * samples_px2.max(1.0);
+        let white = |&p: &DVec2| self.white_beyond(p, covariance, way);
+        let white: Vec<f64> = self.points.iter().map(white).collect();
         let mut normal = design.tr_mul(&design) / variance;
         for i in 0..bits + LEVELS {
             normal[(i, i)] += 1.0;
@@ -291,7 +306,7 @@ impl CellModel {
         let [cells, levels] =
             [design.columns(0, bits), design.columns(bits, LEVELS)].map(|part| part.clone_owned());
         let of_cells = (0..bits).map(of_cell).sum();
-        let joint = JointModel::new(&cells, &levels, variance, of_cells, self.random());
+        let joint = JointModel::new(&cells, &levels, variance, of_cells, || self.random());
         let gain = &inverse * design.transpose() / variance;
         let half_shares: Vec<Vec<f32>> =
             (0..n).map(|i| (0..bits).map(|c| design[(i, c)] as f32).collect()).collect();
@@ -308,7 +323,7 @@ impl CellModel {
             half_shares,
             inverse_variance: (0..bits).map(inverse_variance).collect(),
             spread,
-            joint: joint.map(Rc::new),
+            joint: joint.map(Arc::new),
         })
     }
 
@@ -321,8 +336,7 @@ impl CellModel {
     }
 
     /// Returns the share of the white around the border in a sample.
-    fn white_beyond(&self, point: DVec2, blur: &TileBlur) -> f64 {
-        let ([uu, uv, vv], way) = (blur.covariance, blur.way);
+    fn white_beyond(&self, point: DVec2, [uu, uv, vv]: [f64; 3], way: DVec2) -> f64 {
         let beyond = |inside_bits: f64, variance: f64, way: f64| {
             let sigmas = |bits: f64| (bits / variance.sqrt()) as f32;
             0.5 - 0.5 * f64::from(swept_edge(sigmas(inside_bits), sigmas(way)))
@@ -536,7 +550,7 @@ mod tests {
             let still = [0.25, 0.8, 1.1].map(|bits| (bits, DVec2::ZERO));
             let moved = [(0.3, DVec2::new(1.25, 0.5)), (0.3, DVec2::new(-1.0, 2.0))];
             for (bits, way) in still.into_iter().chain(moved) {
-                let mixing = model.mixing(blur(kind, bits, way), &mut Mixings::new()).unwrap();
+                let mixing = model.mixing(blur(kind, bits, way)).unwrap();
                 let (mut wrong, mut expected) = (0, 0.0);
                 for _ in 0..40 {
                     let word = rng.random::<u64>() & cells.dimension().mask();
@@ -562,8 +576,7 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let cells = TagCells::of(GridKind::Deltille, Dimension::from_bits(16).unwrap());
         let model = CellModel::new(&cells, INSET_BITS, MARGIN_BITS);
-        let mixing =
-            model.mixing(blur(cells.kind(), 0.4, DVec2::ZERO), &mut Mixings::new()).unwrap();
+        let mixing = model.mixing(blur(cells.kind(), 0.4, DVec2::ZERO)).unwrap();
         let samples = seen(&model, &cells, 0b1010_0110_0011_0101, (0.4, DVec2::ZERO), &mut rng);
         let nothing = mixing.half_odds(&vec![Sample::Erased; samples.len()]);
         assert!(nothing.iter().all(|half| half.abs() < 1e-6), "{nothing:?}");

@@ -7,7 +7,7 @@ use glam::DVec2;
 
 use super::grid_light::{GridLight, TagInsets};
 use super::joint_cells::JointOdds;
-use super::soft_cells::{CellModel, Mixings, Sample, in_tile};
+use super::soft_cells::{CellModel, Sample, in_tile};
 use super::tile_map::TileMap;
 use crate::grid::saddle_grid::SaddleGrid;
 use deltille_core::family::Family;
@@ -98,13 +98,6 @@ impl TagPlace {
 /// Black and white levels next to the edges of tiles that were read, by vertex and direction.
 type EdgeLevels = BTreeMap<(Vertex, usize), Option<[f64; 2]>>;
 
-/// Results of reading a tile that the next tiles of its grid reuse.
-#[derive(Default)]
-struct Known {
-    mixings: Mixings,
-    edges: EdgeLevels,
-}
-
 /// Reads the tags of one family that have the same position in their tiles.
 #[derive(Clone, Debug)]
 pub(crate) struct TagReader {
@@ -181,13 +174,13 @@ impl TagReader {
             .filter(|tile| tile.vertices().any(|v| grid.contains_key(&v)))
             .collect();
         let every = tiles.len().div_ceil(most.max(1)).max(1);
-        let mut known = Known::default();
+        let mut edges = EdgeLevels::new();
         let mut bits_px = Vec::new();
         let mut readings = Vec::new();
         for &tile in tiles.iter().step_by(every) {
             let map = TileMap::new(&placed, tile, self.gap_edges);
             let read =
-                map.and_then(|map| self.read_tile(image, grid, tile, &map, &light, &mut known));
+                map.and_then(|map| self.read_tile(image, grid, tile, &map, &light, &mut edges));
             if let Some((reading, bit_px)) = read {
                 readings.push(reading);
                 bits_px.push(bit_px);
@@ -223,9 +216,9 @@ impl TagReader {
         tile: Tile,
         map: &TileMap,
         light: &GridLight,
-        known: &mut Known,
+        edges: &mut EdgeLevels,
     ) -> Option<(Reading, f64)> {
-        let levels = light.levels(image, grid, tile, &mut known.edges)?;
+        let levels = light.levels(image, grid, tile, edges)?;
         let middle = self.kind.middle();
         let [_, contrast] = levels.at(middle);
         if contrast < MIN_CONTRAST * corner_contrast(image, grid, tile) {
@@ -238,7 +231,7 @@ impl TagReader {
             (at(by) - at(-by)) / (2.0 * BESIDE * width)
         });
         let blur = in_tile(&light.blur, along, light.noise)?;
-        let mixing = self.model.mixing(blur, &mut known.mixings)?;
+        let mixing = self.model.mixing(blur)?;
         let (right, lower) = (image.width() as f64 - 1.0, image.height() as f64 - 1.0);
         // Cells of the colour around the border are 1: the dark ones on inverted boards.
         let inverted = tile.is_dark() != (self.tags_in == TagsIn::Black);

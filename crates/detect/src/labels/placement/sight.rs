@@ -1,7 +1,7 @@
 //! Content of the tiles of a grid, independent of the placement.
 
 use std::collections::BTreeMap;
-use std::rc::Rc;
+use std::sync::Arc;
 
 use super::alternatives::{DIRTY, PLAIN_PARTS, or_spoilt};
 use super::labeller::{TagEvidence, TagLabeller, Way};
@@ -56,7 +56,7 @@ impl TagLabeller {
             let mut of_words = match &reading.joint {
                 Some(joint) => {
                     let of_model =
-                        half_squares.entry(Rc::as_ptr(&joint.model)).or_insert_with(|| {
+                        half_squares.entry(Arc::as_ptr(&joint.model)).or_insert_with(|| {
                             let all = self.words.iter();
                             all.map(|word| joint.model.half_square(word)).collect::<Vec<f32>>()
                         });
