@@ -2,7 +2,8 @@
 
 use super::config::DetectorConfig;
 use super::levels::{MIN_LEVEL_SIDE, levels_of};
-use super::one_tiling::{Frame, OneTiling};
+use super::one_tiling::following::Track;
+use super::one_tiling::{Frame, OneTiling, Timing};
 use super::scene::{SceneError, check_detectable, check_distinct};
 use crate::labels::grid_labels::Labels;
 use crate::refine::clearance::TagAreas;
@@ -203,15 +204,63 @@ impl Detector {
 
     /// Implements [`Self::detect`] without generics, so that it is compiled only in this crate.
     fn detect_view(&self, image: ImageView, name: &str) -> Detection {
-        let mut timing = self.main.timing();
+        let mut timing = self.timing();
         let pyramid = Pyramid::new(image, levels_of(image), MIN_LEVEL_SIDE);
         let frame = Frame { image, pyramid: &pyramid };
         timing.lap("pyramid");
-        let found = self.main.detect(frame, timing, name);
-        let mut found = match &self.other {
-            Some(other) => both(found, other.detect(frame, other.timing(), name)),
-            None => found,
+        let mut found = self.of_all(self.tilings().map(|of| of.detect(frame, of.timing(), name)));
+        timing.add_to(&mut found.timing_ms);
+        found
+    }
+
+    /// Returns the detection of an image of a video, and the tracks from there. `before` are the tracks of each tiling up
+    /// to the image before it, if any.
+    pub(crate) fn search(
+        &self,
+        frame: Frame,
+        before: &[Option<Track>],
+        name: &str,
+    ) -> (Detection, Vec<Option<Track>>) {
+        let mut tracks = Vec::new();
+        let found = self.tilings().enumerate().map(|(i, of)| {
+            let (found, shared) = of.search(frame, of.timing(), name);
+            let before = before.get(i).and_then(Option::as_ref);
+            tracks.push(of.track(frame.image, &found.grids, shared, before));
+            found
+        });
+        (self.of_all(found), tracks)
+    }
+
+    /// Returns the detection of the next image of a video, and the tracks from there; `None` if the image has to be
+    /// searched.
+    pub(crate) fn follow(
+        &self,
+        frame: Frame,
+        tracks: &[Option<Track>],
+        name: &str,
+    ) -> Option<(Detection, Vec<Option<Track>>)> {
+        let follow = |(i, of): (usize, &OneTiling)| {
+            of.follow(frame, tracks.get(i)?.as_ref()?, of.timing(), name)
         };
+        let followed: Option<Vec<_>> = self.tilings().enumerate().map(follow).collect();
+        let (found, tracks): (Vec<Detection>, Vec<_>) = followed?.into_iter().unzip();
+        Some((self.of_all(found.into_iter()), tracks))
+    }
+
+    /// Starts the stopwatch of the stages.
+    pub(crate) fn timing(&self) -> Timing {
+        self.main.timing()
+    }
+
+    /// Returns the stages of each tiling.
+    fn tilings(&self) -> impl Iterator<Item = &OneTiling> {
+        std::iter::once(&self.main).chain(self.other.as_deref())
+    }
+
+    /// Combines the detections of each tiling.
+    fn of_all(&self, mut found: impl Iterator<Item = Detection>) -> Detection {
+        let first = found.next().unwrap_or_else(|| Detection::new("", [0; 2], Vec::new()));
+        let mut found = found.fold(first, both);
         found.targets = self.targets.clone();
         found
     }

@@ -13,7 +13,8 @@
 //! [`deltille_core::detection`] defines the result.
 //!
 //! `one_tiling` runs these stages, with its `refining` for the last one, and `nothing_seen` finds the reason if they end
-//! without a grid. `detector` detects targets of both tilings with the settings of `config`. `recognise` guesses the
+//! without a grid. `detector` detects targets of both tilings with the settings of `config`, and `tracker` in the images of
+//! a video. `recognise` guesses the
 //! target if none is given. `scene` checks whether several targets can be distinguished. A module imports only from
 //! modules above it in this list.
 //!
@@ -32,6 +33,7 @@ mod recognise;
 mod refine;
 mod scene;
 mod tiling;
+mod tracker;
 mod transformed;
 
 pub use config::DetectorConfig;
@@ -44,3 +46,4 @@ pub use recognise::{Recognised, Recogniser};
 pub use refine::model::fitter::SLOPE_PRIOR;
 pub use refine::refiner::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner};
 pub use scene::{SceneError, check_distinct};
+pub use tracker::Tracker;

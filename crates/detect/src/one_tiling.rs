@@ -1,10 +1,12 @@
 //! The stages of detection for the targets of one tiling.
 
+pub(crate) mod following;
 mod refining;
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use self::refining::Shared;
 use super::config::DetectorConfig;
 use super::nothing_seen::nothing_found;
 use super::tiling::{CHECKER, DELTILLE, kind, step};
@@ -70,8 +72,8 @@ type Judged = Vec<(Grid, Option<Reason>)>;
 /// Result for an image.
 struct Found {
     grids: Judged,
-    /// Optics that the grids have in common.
-    optics: Optics,
+    /// What the corners have in common.
+    shared: Shared,
     /// Reasons why other grids are left out.
     left_out: Vec<Reason>,
     /// Number of detected corners.
@@ -147,9 +149,14 @@ impl OneTiling {
 
     /// Returns the detection of an image. `name` is copied to the result.
     pub(super) fn detect(&self, frame: Frame, timing: Timing, name: &str) -> Detection {
+        self.search(frame, timing, name).0
+    }
+
+    /// Returns the detection of an image, and what its corners have in common.
+    pub(super) fn search(&self, frame: Frame, timing: Timing, name: &str) -> (Detection, Shared) {
         match &self.finder {
-            Finder::Deltille(finder) => self.detect_with(finder, frame, timing, name),
-            Finder::Checker(finder) => self.detect_with(finder, frame, timing, name),
+            Finder::Deltille(finder) => self.search_with(finder, frame, timing, name),
+            Finder::Checker(finder) => self.search_with(finder, frame, timing, name),
         }
     }
 
@@ -158,17 +165,17 @@ impl OneTiling {
         Timing::start(self.clock)
     }
 
-    fn detect_with<const N: usize>(
+    fn search_with<const N: usize>(
         &self,
         finder: &SaddleFinder<N>,
         frame: Frame,
         mut timing: Timing,
         name: &str,
-    ) -> Detection {
+    ) -> (Detection, Shared) {
         let Frame { image, pyramid } = frame;
         let whole = self.whole_on_coarser_level(finder, frame, &mut timing);
-        let Found { grids, optics, left_out, saddles } = match whole {
-            Some((grids, optics)) => Found { grids, optics, left_out: Vec::new(), saddles: 0 },
+        let Found { grids, shared, left_out, saddles } = match whole {
+            Some((grids, shared)) => Found { grids, shared, left_out: Vec::new(), saddles: 0 },
             None => self.all_grids(finder, frame, &mut timing),
         };
         let mut reasons = if grids.is_empty() {
@@ -192,15 +199,27 @@ impl OneTiling {
         reasons.extend(
             left_out.into_iter().filter(|reason| !grids.is_empty() && is_of_others(reason)),
         );
-        let size = [image.width() as u32, image.height() as u32];
         let grids = grids.into_iter().map(|(grid, _)| grid).collect();
+        let mut found = self.detection(image, name, grids, &shared.optics, timing);
+        found.reasons = reasons;
+        (found, shared)
+    }
+
+    fn detection(
+        &self,
+        image: ImageView,
+        name: &str,
+        grids: Vec<Grid>,
+        optics: &Optics,
+        timing: Timing,
+    ) -> Detection {
+        let size = [image.width() as u32, image.height() as u32];
         let mut found = Detection::new(name, size, grids);
         found.tone = optics.tone;
         found.ink = self.ink.or_else(|| {
             let ink = optics.ink_found?;
             Some(self.edge_mm.map_or(ink, |edge_mm| ink.on_print(edge_mm)))
         });
-        found.reasons = reasons;
         found.timing_ms = timing.laps;
         found
     }
@@ -214,7 +233,7 @@ impl OneTiling {
         finder: &SaddleFinder<N>,
         frame: Frame,
         timing: &mut Timing,
-    ) -> Option<(Judged, Optics)> {
+    ) -> Option<(Judged, Shared)> {
         let whole = self.labels.whole()?;
         let pyramid = frame.pyramid;
         let levels = pyramid.levels();
@@ -308,7 +327,7 @@ impl OneTiling {
             let reasons = reasons.chain(left_out.iter_mut().take(of_found));
             self.name_other_settings(image, &found, reasons);
         }
-        let (mut grids, mut optics) = self.refined::<N>(frame, grids);
+        let (mut grids, mut shared) = self.refined::<N>(frame, grids);
         timing.lap("refine");
         if !self.tag_areas.is_empty()
             && !grids.is_empty()
@@ -319,11 +338,11 @@ impl OneTiling {
                 grids.iter().filter_map(|grid| with_positions(&found, grid)).collect();
             let again = self.plausible::<N>(frame, &precise, &mut Vec::new());
             if again.iter().any(|(grid, _)| is_labelled(grid)) {
-                (grids, optics) = self.refined::<N>(frame, again);
+                (grids, shared) = self.refined::<N>(frame, again);
             }
             timing.lap("labels");
         }
-        Found { grids, optics, left_out, saddles: saddles.len() }
+        Found { grids, shared, left_out, saddles: saddles.len() }
     }
 
     /// Returns whether grids may lack corners because their tags are too near: none is identified, or one that is does not
@@ -382,14 +401,13 @@ impl OneTiling {
         }
     }
 
-    /// Refines the corners of the grids. Returns those that are still grids, and the optics that
-    /// they have in common.
-    fn refined<const N: usize>(&self, frame: Frame, grids: Judged) -> (Judged, Optics) {
+    /// Refines the corners of the grids. Returns those that are still grids, and what they have in common.
+    fn refined<const N: usize>(&self, frame: Frame, grids: Judged) -> (Judged, Shared) {
         let least = least_untagged_corners(kind::<N>()) as usize;
         let mut fitter = CornerFitter::default();
         let (mut refined, reasons): (Vec<Grid>, Vec<Option<Reason>>) = grids.into_iter().unzip();
-        let (optics, are_waves) = self.refine(&mut fitter, frame, &mut refined);
-        let refined = refined.into_iter().zip(reasons).zip(are_waves);
+        let shared = self.refine(&mut fitter, frame, &mut refined);
+        let refined = refined.into_iter().zip(reasons).zip(shared.are_waves.iter().copied());
         let mut grids: Judged = refined
             .filter(|((grid, _), is_wave)| {
                 is_confirmed(grid) || grid.corners.len() >= least && !is_wave
@@ -398,7 +416,7 @@ impl OneTiling {
             .collect();
         let may_have_tags = !self.tag_areas.is_empty();
         // Halftones look like boards of unknown size whose edges have moved.
-        let ink = self.labels.whole().map_or(0.0, |_| optics.ink());
+        let ink = self.labels.whole().map_or(0.0, |_| shared.optics.ink());
         grids.retain(|(grid, _)| {
             // An outline alone does not distinguish squares that have shrunk from dots.
             let is_certain = is_confirmed(grid) || is_labelled(grid) && ink.abs() <= LARGE_INK;
@@ -406,7 +424,7 @@ impl OneTiling {
         });
         // Refinement has removed some false corners.
         self.refuse_patterns(frame.pyramid, &mut grids);
-        (grids, optics)
+        (grids, shared)
     }
 
     /// Returns the labelled grids that may belong to a target. Adds the reasons for the others to `left_out`. Reasons
@@ -581,6 +599,13 @@ impl Timing {
             *self.laps.entry(stage.to_owned()).or_default() +=
                 now.saturating_sub(*last).as_secs_f64() * 1e3;
             *last = now;
+        }
+    }
+
+    /// Adds the times to those of other stages, ms.
+    pub(super) fn add_to(self, laps: &mut BTreeMap<String, f64>) {
+        for (stage, ms) in self.laps {
+            *laps.entry(stage).or_default() += ms;
         }
     }
 }

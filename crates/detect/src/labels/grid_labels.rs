@@ -18,7 +18,7 @@ use crate::grid::untagged::tile_shape::is_of_squares;
 use deltille_core::detection::{DecodedTag, Grid, GridCorner};
 use deltille_core::detection::{OtherSettings, Reason, ReasonKind};
 use deltille_core::family::Family;
-use deltille_core::lattice::{GridKind, LatticeMap, Vertex};
+use deltille_core::lattice::{GridKind, LatticeMap, Tile, Vertex};
 use deltille_core::raster::ImageView;
 use deltille_core::targets::{Target, board_vertices};
 
@@ -66,6 +66,15 @@ struct TargetPanel {
     inverted: bool,
     tagged: bool,
     corner_ids: BTreeMap<Vertex, u32>,
+}
+
+/// The lattice of a panel.
+pub(crate) struct PanelShape {
+    pub corners: BTreeSet<Vertex>,
+    /// Tiles with a tag.
+    pub tagged: Vec<Tile>,
+    /// Whether black and white are exchanged.
+    pub inverted: bool,
 }
 
 /// Maximum number of corners of a board. A board of 140 × 140 corners has edges of 14 px in an image of 4
@@ -191,6 +200,30 @@ impl Labels {
                 targets.iter().find_map(|(_, labels)| labels.other_settings(image, grid))
             }
             Source::None | Source::Outline(_) | Source::Rectangle(_) => None,
+        }
+    }
+
+    /// Returns the panel that a labelled grid shows.
+    pub(crate) fn panel_of(&self, grid: &Grid) -> Option<PanelShape> {
+        let untagged = |corners| Some(PanelShape { corners, tagged: Vec::new(), inverted: false });
+        match &self.source {
+            Source::None => None,
+            Source::Outline(outline) => untagged(outline.clone()),
+            Source::Rectangle([rows, cols]) => {
+                let vertices = (0..*rows).flat_map(|row| (0..*cols).map(move |col| (row, col)));
+                untagged(vertices.map(|(row, col)| Vertex::new(row as i32, col as i32)).collect())
+            }
+            Source::Scene(targets) => {
+                let is_own = |(name, _): &&(String, Self)| grid.target.as_ref() == Some(name);
+                targets.iter().find(is_own)?.1.panel_of(grid)
+            }
+            Source::Target { tags, panels, .. } => {
+                let index = panels.iter().position(|panel| Some(panel.id) == grid.panel)?;
+                let panel = &panels[index];
+                let tagged = tags.iter().flat_map(|tags| tags.tagged_tiles(index)).collect();
+                let corners = panel.corner_ids.keys().copied().collect();
+                Some(PanelShape { corners, tagged, inverted: panel.inverted })
+            }
         }
     }
 

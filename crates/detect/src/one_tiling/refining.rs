@@ -10,7 +10,7 @@ use crate::labels::grid_light::{GridLight, TagInsets};
 use crate::refine::edge_shift::{EdgeShift, centre, large_shift};
 use crate::refine::model::fitter::CornerFitter;
 use crate::refine::optics::Optics;
-use crate::refine::refine_grid::{Level, is_sampled, sharp_level};
+use crate::refine::refine_grid::{Level, Seen, is_sampled, sharp_level};
 use crate::refine::refiner::Refiner;
 use deltille_core::detection::{Grid, GridCorner};
 use deltille_core::lattice::{GridKind, Vertex};
@@ -32,15 +32,27 @@ const MIN_MOTION_BLUR_PX: f64 = 1.5;
 /// Largest displacement of edges by tags that are blurred into them, in standard deviations of the blur.
 const TAG_SHIFT_BLURS: f64 = 1.0;
 
+/// What the refined corners of an image have in common.
+#[derive(Clone, Debug)]
+pub(crate) struct Shared {
+    pub(crate) optics: Optics,
+    /// For each grid, whether blur leaves only its fundamental wave.
+    pub(crate) are_waves: Vec<bool>,
+    /// The blur of each grid, px.
+    pub(crate) blurs: Vec<Option<f64>>,
+    /// Noise of the first grid, as a fraction of full scale; `None` if grids were refined on a coarser level, or from
+    /// their motion or moved edges.
+    pub(crate) noise: Option<f64>,
+}
+
 impl OneTiling {
-    /// Refines all grids on the level of the pyramid that suits their blur. Returns the common
-    /// optics, and for each grid whether blur leaves only its fundamental wave.
+    /// Refines all grids on the level of the pyramid that suits their blur.
     pub(super) fn refine(
         &self,
         fitter: &mut CornerFitter,
         frame: Frame,
         grids: &mut [Grid],
-    ) -> (Optics, Vec<bool>) {
+    ) -> Shared {
         let levels = frame.pyramid.levels();
         let finest = Level { image: frame.image, enlarged: 0, coarser: &levels[1..] };
         let mut blurs = self.refiner.blurs(fitter, finest, grids, &self.tag_areas);
@@ -73,15 +85,28 @@ impl OneTiling {
             let optics = refiner.optics(fitter, level, grids, &blurs, &self.tag_areas);
             // Motion blur leaves an image sharp perpendicular to the motion.
             let found = (number == least || is_sampled(&blurs, optics.narrowest()))
-                .then(|| self.refine_under(&refiner, fitter, image, grids, &optics, &blurs));
+                .then(|| self.refine_under(&refiner, fitter, image, grids, optics, &blurs));
             grids.iter_mut().for_each(|grid| grid.moved_from_level(number));
-            if let Some(are_waves) = found {
-                return (optics, are_waves);
+            if let Some(found) = found {
+                return Shared { noise: None, ..found };
             }
         }
         let optics = refiner.optics(fitter, finest, grids, &blurs, &self.tag_areas);
-        let are_waves = self.refine_under(&refiner, fitter, frame.image, grids, &optics, &blurs);
-        (optics, are_waves)
+        let found = self.refine_under(&refiner, fitter, frame.image, grids, optics, &blurs);
+        let is_usual = matches!(refiner, Cow::Borrowed(_));
+        Shared { noise: found.noise.filter(|_| is_usual), ..found }
+    }
+
+    /// Refines all grids in an image whose optics and blurs, px, are nearly known.
+    pub(super) fn refine_again(
+        &self,
+        fitter: &mut CornerFitter,
+        image: ImageView,
+        grids: &mut [Grid],
+        optics: &Optics,
+        blurs: &[Option<f64>],
+    ) -> Shared {
+        self.refine_under(&self.refiner, fitter, image, grids, optics.clone(), blurs)
     }
 
     /// Returns the blur of the largest grid if its edges show motion and have not moved by `shift` instead. Only grids with
@@ -109,21 +134,29 @@ impl OneTiling {
         moved.is_none_or(|moved| still.misfit < moved.misfit).then_some(still.blur)
     }
 
-    /// Refines the grids in an image with these optics and blurs, px; see [`Self::refine`].
+    /// Refines the grids in an image with these optics and blurs, px.
     fn refine_under(
         &self,
         refiner: &Refiner,
         fitter: &mut CornerFitter,
         image: ImageView,
         grids: &mut [Grid],
-        optics: &Optics,
+        optics: Optics,
         blurs: &[Option<f64>],
-    ) -> Vec<bool> {
-        let refine = |(grid, &blur_px): (&mut Grid, &Option<f64>)| {
-            let edge_px = grid.edge_px().unwrap_or(0.0);
-            refiner.refine_grid(fitter, image, grid, &self.tag_areas, optics, blur_px);
-            blur_px.is_some_and(|blur_px| blur_px > max_untagged_blur(grid.kind) * edge_px)
+    ) -> Shared {
+        let mut refine = |(grid, &blur_px): (&mut Grid, &Option<f64>)| {
+            refiner.refine_grid(fitter, image, grid, &self.tag_areas, &optics, blur_px)
         };
-        grids.iter_mut().zip(blurs).map(refine).collect()
+        let seen: Vec<Option<Seen>> = grids.iter_mut().zip(blurs).map(&mut refine).collect();
+        let is_wave = |(grid, blur): (&Grid, &Option<f64>)| {
+            let edge_px = grid.edge_px().unwrap_or(0.0);
+            blur.is_some_and(|blur_px| blur_px > max_untagged_blur(grid.kind) * edge_px)
+        };
+        Shared {
+            are_waves: grids.iter().zip(blurs).map(is_wave).collect(),
+            blurs: seen.iter().map(|seen| seen.map(|seen| seen.blur_px)).collect(),
+            noise: seen.first().and_then(|seen| seen.map(|seen| seen.noise)),
+            optics,
+        }
     }
 }

@@ -89,6 +89,15 @@ pub(crate) struct Level<'a> {
     pub coarser: &'a [Gray<i16>],
 }
 
+/// Medians over the corners of a grid.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Seen {
+    /// Standard deviation of the blur, px.
+    pub blur_px: f64,
+    /// Standard deviation of the residuals, as a fraction of full scale.
+    pub noise: f64,
+}
+
 impl Refiner {
     /// Returns the blur of each grid, px, if the model can measure it.
     pub(crate) fn blurs(
@@ -159,7 +168,8 @@ impl Refiner {
         self.joint_optics(fitter, image, samples, &known)
     }
 
-    /// Refines the corners of a grid in place, given its blur in px, and drops corrupted corners.
+    /// Refines the corners of a grid in place, given its blur in px, and drops corrupted corners. Returns medians of the
+    /// others.
     pub(crate) fn refine_grid(
         &self,
         fitter: &mut CornerFitter,
@@ -168,7 +178,7 @@ impl Refiner {
         tags: &TagAreas,
         optics: &Optics,
         blur_px: Option<f64>,
-    ) {
+    ) -> Option<Seen> {
         let sharpness = Sharpness { blur_px: blur_px.unwrap_or(TYPICAL_BLUR_PX), optics };
         let mut around = surroundings(grid, tags, 1.0);
         let mut refined = self.refine_each(image, grid, &around, sharpness);
@@ -213,11 +223,11 @@ impl Refiner {
             }
         }
         grid.corners = kept;
-        self.follow_bends(image, grid, tags, &fits, limit, sharpness);
+        self.follow_bends(image, grid, tags, &fits, limit, sharpness)
     }
 
     /// Fits the corners again with the curvature of the edges, which follows from their positions. Fits with a residual
-    /// above `limit` do not count.
+    /// above `limit` do not count. Returns medians of the fits.
     fn follow_bends(
         &self,
         image: ImageView,
@@ -226,7 +236,7 @@ impl Refiner {
         fits: &[Option<ModelFit>],
         limit: f64,
         sharpness: Sharpness,
-    ) {
+    ) -> Option<Seen> {
         let again = |around: &[Surroundings], fits: &[Option<ModelFit>]| {
             each(fits.len(), |fitter, i| {
                 let fit = fits[i].as_ref()?;
@@ -274,6 +284,8 @@ impl Refiner {
             settled(of_fit).or_else(|| met_by_edges(image, of_fit.0, around))
         };
         grid.corners = corners.filter_map(held).collect();
+        let blurs = fits.iter().flatten().map(ModelFit::blur_px).collect();
+        median(blurs).map(|blur_px| Seen { blur_px, noise: usual })
     }
 
     /// Returns whether the clear area around a corner suffices for the model.

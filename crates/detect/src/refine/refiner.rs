@@ -282,6 +282,11 @@ impl Refiner {
         self.known.is_ink_open()
     }
 
+    /// Returns the position of a corner near `start` to within a tenth of a pixel, by the polynomial.
+    pub(crate) fn found(&self, image: ImageView, start: DVec2) -> Option<DVec2> {
+        self.polynomial.find(image, start).map(|found| found.position)
+    }
+
     /// Refines the corner near `start`, in the whole window.
     ///
     /// An unknown tone curve is estimated from this corner; [`Self::refine_all`] uses all corners of an image.

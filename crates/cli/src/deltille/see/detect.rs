@@ -17,12 +17,13 @@ use crate::run::{self, BAD_INPUT, FAILED, Interrupted};
 use crate::values::{format, whole};
 use crate::{interrupt, progress};
 use deltille::clock;
-use deltille::detect::{Detection, Detector, InkEstimate};
+use deltille::detect::{Detection, Detector, InkEstimate, Tracker};
 use deltille::export::kind::Kind;
 use deltille::export::named::Format;
 use deltille::export::tables::ImageRecord;
 use deltille::export::{DETECTION_FORMATS, DetectionFormat, atomic, detection, overlay};
 use deltille::photograph::{self, Photograph};
+use deltille::raster::AnyGray;
 use deltille::targets::Target;
 use deltille_core::words::{counted, shown};
 
@@ -53,6 +54,10 @@ pub struct Args {
     /// none
     #[arg(long)]
     stream: bool,
+    /// The images are successive frames of a video, in this order: follow the targets from frame to frame, several times
+    /// as fast as detection. Tags in the result are those that were read again
+    #[arg(long, conflicts_with = "jobs")]
+    track: bool,
     /// Accept incomplete JPEG files and note the damage in the result; otherwise they are errors
     #[arg(long)]
     accept_damaged: bool,
@@ -64,6 +69,26 @@ pub struct Args {
     /// Number of images processed in parallel [default: one per processor]
     #[arg(short, value_name = "N", value_parser = whole(1..=1024u16))]
     jobs: Option<u16>,
+}
+
+/// Detects targets in single images, or in those of a video.
+struct Eye {
+    detector: Detector,
+    tracker: Option<Mutex<Tracker>>,
+}
+
+impl Eye {
+    fn of(args: &Args, detector: Detector) -> Self {
+        let tracker = args.track.then(|| Mutex::new(Tracker::new(detector.clone())));
+        Self { detector, tracker }
+    }
+
+    fn detect(&self, image: &AnyGray, name: &str) -> Detection {
+        match &self.tracker {
+            Some(tracker) => tracker.lock().expect("no thread panics here").detect(image, name),
+            None => self.detector.detect(image, name),
+        }
+    }
 }
 
 /// Outcome of an image.
@@ -103,6 +128,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         bail!("--format {name} does not support several targets; use one --target at a time");
     }
     let detector = if args.timing { detector.with_clock(clock::now) } else { detector };
+    let eye = Eye::of(&args, detector);
     let images = Images::of(&args.images)?;
     // Detects name clashes among the named images before the work starts.
     let mut named = Stems::default();
@@ -141,7 +167,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
 
     let bar = progress::bar(images.count().unwrap_or(0) as u64, "images");
-    let threads = rayon::ThreadPoolBuilder::new().num_threads(args.jobs.unwrap_or(0).into());
+    // Frames of a video are processed in order.
+    let jobs = if args.track { 1 } else { args.jobs.unwrap_or(0) };
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(jobs.into());
     // Sequential, so that of two images with the same stem the later one is always rejected.
     let mut stems = Stems::default();
     let claimed = images.iter().map(|image| {
@@ -169,7 +197,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             {
                 return Ok(Outcome::Skipped);
             }
-            let found = one_image(&args, &targets, &detector, &image, &stem)?;
+            let found = one_image(&args, &targets, &eye, &image, &stem)?;
             let looked_at = Seen { index, image, stem, ink: found.ink };
             seen.lock().expect("no thread panics here").push(looked_at);
             Ok(Outcome::Seen(Box::new(found)))
@@ -190,10 +218,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     seen.sort_unstable_by_key(|seen| seen.index);
     let mut again = None;
     if args.stream {
-        note_ink_of_all(&detector, &seen);
+        note_ink_of_all(&eye.detector, &seen);
     } else if !interrupt::is_raised() {
         let unseen = unseen.into_inner().expect("no thread panics here");
-        again = see_again(&args, &targets, &detector, &seen, unseen, &threads, &report)?;
+        again = see_again(&args, &targets, &eye.detector, &seen, unseen, &threads, &report)?;
     }
     if let Some(tables) = tables {
         let is_left = interrupt::is_raised();
@@ -243,6 +271,7 @@ fn see_again(
     let Some(ink) = InkEstimate::of_all(&known).filter(|ink| ink.used) else { return Ok(None) };
     let mut tables = None;
     if let Some(detector) = detector.with_ink_of(&found) {
+        let eye = Eye::of(args, detector);
         let bar = progress::bar(seen.len() as u64, "images, second pass with joint ink estimate");
         let images = seen.iter().map(|seen| Ok(seen.image.clone()));
         tables = args.tables().map(|folder| Tables::begin(folder, targets)).transpose()?;
@@ -254,7 +283,7 @@ fn see_again(
                 return;
             }
             let Seen { index, image, stem, .. } = &seen[index];
-            let again = one_image(args, targets, &detector, image, stem);
+            let again = one_image(args, targets, &eye, image, stem);
             again.as_ref().err().iter().for_each(|error| bar.suspend(|| report.fail_again(error)));
             if let Some(tables) = &tables {
                 tables.add(
@@ -422,14 +451,14 @@ impl Args {
 fn one_image(
     args: &Args,
     targets: &[Target],
-    detector: &Detector,
+    eye: &Eye,
     path: &Path,
     stem: &str,
 ) -> anyhow::Result<Found> {
     let limits = args.finder.limits();
     let Photograph { image, notes } =
         photograph::read_with_notes(path, &limits, args.accept_damaged)?;
-    let mut found = detector.detect(&image, &name_of(path));
+    let mut found = eye.detect(&image, &name_of(path));
     found.file = notes;
     if let Some(folder) = args.folder() {
         let path = |extension: &str| folder.join(format!("{stem}.{extension}"));

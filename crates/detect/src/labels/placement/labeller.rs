@@ -147,6 +147,11 @@ impl TagLabeller {
         Self::with_decoder(target, family, max_errors, || Decoder::new(family))
     }
 
+    /// Returns the tiles with a tag of the panel at this index.
+    pub(crate) fn tagged_tiles(&self, panel: usize) -> impl Iterator<Item = Tile> {
+        self.panels[panel].tags.keys().copied()
+    }
+
     /// Creates the labeller; see [`Self::new`]. `decoder` is called for the whole family if the target has tags.
     pub(super) fn with_decoder(
         target: &Target,

@@ -1,0 +1,344 @@
+//! Follows labelled grids from one image of a video to the next.
+//!
+//! Corners move on like between the last two images. On a coarse level of the pyramid, where they are still separate, the
+//! polynomial finds how far they are from there, and a common affine motion rejects those that it mistook. Refinement
+//! starts from these positions with the optics of an earlier image. Then some tags, or the outline of an untagged board,
+//! have to confirm the labels by the same evidence as in a single image. If anything fails, the image is searched.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::DVec2;
+use nalgebra::{Matrix3, Vector3};
+
+use super::refining::Shared;
+use super::{Frame, MIN_COARSE_EDGE_PX, OneTiling, Timing, is_labelled};
+use crate::grid::saddle_grid::{PlacedSaddle, SaddleGrid};
+use crate::labels::grid_labels::FoundGrid;
+use crate::labels::placement::labeller::Budget;
+use crate::refine::clearance::Prediction;
+use crate::refine::model::fitter::CornerFitter;
+use crate::refine::optics::Optics;
+use deltille_core::detection::{Detection, Grid, GridCorner};
+use deltille_core::lattice::{GridKind, Vertex};
+use deltille_core::raster::{ImageView, Pyramid};
+use deltille_core::statistics::median;
+
+/// Number of images after which corners that are missing, or other panels, are searched for again.
+const SEARCH_EVERY: usize = 10;
+
+/// Maximum number of corners whose motion is measured; it has six parameters.
+const MOTION_CORNERS: usize = 40;
+
+/// Maximum distance of a corner from its prediction, as a fraction of the shortest edge. Beyond half an edge, the nearest
+/// corner is another one.
+const MAX_WAY: f64 = 0.35;
+
+/// Minimum fraction of corners that agree with a common motion.
+const MIN_AGREEING: f64 = 0.6;
+
+/// Rounds in which corners that disagree are rejected.
+const ROUNDS: usize = 3;
+
+/// Deviation from the common motion up to which a corner agrees, px of the level.
+const AGREES_PX: f64 = 0.75;
+
+/// Minimum fraction of the corners in the image that refinement keeps.
+const MIN_KEPT: f64 = 0.8;
+
+/// Maximum change of the noise under the same optics, as a ratio. The median over a hundred corners scatters by 2 %.
+const MAX_NOISE_RATIO: f64 = 1.1;
+
+/// Number of tags that confirm the labels of a grid. Each alone is evidence enough in a usual family.
+const TAGS: usize = 5;
+
+/// Distance of a corner from the side of the image from which it is visible, in edges.
+const CLEAR_EDGES: f64 = 0.5;
+
+/// The labelled grids of an image and its optics, from which the next image starts.
+#[derive(Clone, Debug)]
+pub(crate) struct Track {
+    grids: Vec<TrackedGrid>,
+    optics: Optics,
+    /// Noise of the corners in the image from which the optics were estimated.
+    noise: f64,
+    blurs: Vec<Option<f64>>,
+    /// Number of images since the last search.
+    age: usize,
+}
+
+#[derive(Clone, Debug)]
+struct TrackedGrid {
+    grid: Grid,
+    /// Displacements since the image before, px.
+    steps: BTreeMap<Vertex, DVec2>,
+    /// Corners in the image that the last search did not find.
+    absent: BTreeSet<Vertex>,
+}
+
+impl OneTiling {
+    /// Returns the track that begins with the grids of a searched image, if all of them are labelled. `before` is the track
+    /// up to the image before it.
+    pub(crate) fn track(
+        &self,
+        image: ImageView,
+        grids: &[Grid],
+        shared: Shared,
+        before: Option<&Track>,
+    ) -> Option<Track> {
+        let Shared { optics, noise, blurs, .. } = shared;
+        let can_be_followed = |grid: &Grid| {
+            !grid.mirrored && (is_labelled(grid) || self.is_whole(grid)) && self.is_sought()
+        };
+        if grids.is_empty() || !grids.iter().all(can_be_followed) {
+            return None;
+        }
+        let tracked = grids.iter().map(|grid| TrackedGrid {
+            absent: self.visible_beside(image, grid).collect(),
+            ..TrackedGrid::after(grid, before)
+        });
+        Some(Track { grids: tracked.collect(), optics, noise: noise?, blurs, age: 0 })
+    }
+
+    /// Returns the detection of the next image, and the track from there. Returns `None` if the image has to be searched.
+    pub(crate) fn follow(
+        &self,
+        frame: Frame,
+        track: &Track,
+        mut timing: Timing,
+        name: &str,
+    ) -> Option<(Detection, Option<Track>)> {
+        let is_complete = track.grids.len() == 1 && self.is_whole(&track.grids[0].grid);
+        if track.age + 1 >= SEARCH_EVERY && !is_complete {
+            return None;
+        }
+        let moved: Option<Vec<Grid>> =
+            track.grids.iter().map(|tracked| self.moved(frame, tracked)).collect();
+        let mut grids = moved?;
+        let appears = |(grid, tracked): (&Grid, &TrackedGrid)| {
+            self.visible_beside(frame.image, grid).any(|vertex| !tracked.absent.contains(&vertex))
+        };
+        if grids.iter().zip(&track.grids).any(appears) {
+            return None;
+        }
+        timing.lap("follow");
+        let counts: Vec<usize> = grids.iter().map(|grid| grid.corners.len()).collect();
+        let start = grids.clone();
+        let mut fitter = CornerFitter::default();
+        let Track { optics, noise, blurs, .. } = track;
+        let mut refined = self.refine_again(&mut fitter, frame.image, &mut grids, optics, blurs);
+        let ratio = refined.noise? / noise;
+        if !(1.0 / MAX_NOISE_RATIO..=MAX_NOISE_RATIO).contains(&ratio) {
+            // Exposure, motion or focus has changed.
+            grids = start;
+            refined = self.refine(&mut fitter, frame, &mut grids);
+        } else {
+            refined.noise = Some(*noise);
+        }
+        timing.lap("refine");
+        let is_kept =
+            |(grid, count): (&Grid, &usize)| grid.corners.len() as f64 >= MIN_KEPT * *count as f64;
+        let is_lost = !grids.iter().zip(&counts).all(is_kept) || refined.are_waves.contains(&true);
+        if is_lost || !grids.iter_mut().all(|grid| self.confirm(frame.image, grid, track.age)) {
+            return None;
+        }
+        timing.lap("labels");
+        let found = self.detection(frame.image, name, grids.clone(), &refined.optics, timing);
+        let next = refined.noise.map(|noise| {
+            let tracked = grids.iter().zip(&track.grids).map(|(grid, before)| TrackedGrid {
+                absent: before.absent.clone(),
+                ..TrackedGrid::after(grid, Some(track))
+            });
+            let Shared { optics, blurs, .. } = refined;
+            Track { grids: tracked.collect(), optics, noise, blurs, age: track.age + 1 }
+        });
+        Some((found, next))
+    }
+
+    /// Returns a grid with its corners at the positions to which they have moved in this image; `None` if they are not
+    /// found.
+    fn moved(&self, frame: Frame, tracked: &TrackedGrid) -> Option<Grid> {
+        let levels = frame.pyramid.levels();
+        let mut grid = tracked.predicted();
+        let shortest_px = shortest_edge_px(&grid);
+        let is_coarse_enough =
+            |&level: &usize| shortest_px >= MIN_COARSE_EDGE_PX * f64::from(1u32 << level);
+        let level = (0..levels.len()).rfind(is_coarse_enough).unwrap_or(0);
+        let image = if level == 0 { frame.image } else { ImageView::from(&levels[level]) };
+        let every = grid.corners.len().div_ceil(MOTION_CORNERS).max(1);
+        let found = grid.corners.iter().step_by(every).filter_map(|corner| {
+            let start = corner.position();
+            let place = self.refiner.found(image, Pyramid::from_level_0(level, start))?;
+            let way = Pyramid::to_level_0(level, place) - start;
+            (way.length() <= MAX_WAY * shortest_px).then_some((start, way))
+        });
+        let found: Vec<(DVec2, DVec2)> = found.collect();
+        let least = MIN_AGREEING * (grid.corners.len() as f64 / every as f64);
+        let motion = affine_motion(found, AGREES_PX * f64::from(1u32 << level), least)?;
+        grid.corners.retain_mut(|corner| {
+            corner.move_to(corner.position() + motion(corner.position()));
+            is_inside(frame.image, corner.position(), 0.0)
+        });
+        Some(grid)
+    }
+
+    /// Returns whether some tags of a grid, or its outline, confirm its labels. Replaces its tags by those that were read.
+    fn confirm(&self, image: ImageView, grid: &mut Grid, number: usize) -> bool {
+        let Some(panel) = self.labels.panel_of(grid) else { return false };
+        let known: BTreeMap<Vertex, DVec2> = grid
+            .corners
+            .iter()
+            .map(|corner| (Vertex::new(corner.row, corner.col), corner.position()))
+            .collect();
+        let tiles: Vec<_> = panel
+            .tagged
+            .iter()
+            .map(|tile| tile.vertices().collect::<Vec<_>>())
+            .filter(|tile| tile.iter().all(|vertex| known.contains_key(vertex)))
+            .collect();
+        let every = tiles.len().div_ceil(TAGS).max(1);
+        let chosen: BTreeSet<Vertex> = match panel.tagged.is_empty() {
+            true => known.keys().copied().collect(),
+            // Others in each image.
+            false => tiles.iter().skip(number % every).step_by(every).flatten().copied().collect(),
+        };
+        // Upright tiles of a found grid are dark.
+        let as_found = |Vertex { row, col }: Vertex| match (panel.inverted, grid.kind) {
+            (false, _) => Vertex::new(row, col),
+            (true, GridKind::Deltille) => Vertex::new(-row, -col),
+            (true, GridKind::Checker) => Vertex::new(row, col + 1),
+        };
+        let placed = |vertex: &Vertex| {
+            (as_found(*vertex), PlacedSaddle { position: known[vertex], amplitude: 0.0 })
+        };
+        let corners: SaddleGrid = chosen.iter().map(placed).collect();
+        let found = FoundGrid { kind: grid.kind, corners: &corners };
+        let labelled = self.labels.label(image, found, &mut Budget::default());
+        let [(labelled, None)] = &labelled[..] else { return false };
+        let is_equal = |corner: &GridCorner| {
+            known.get(&Vertex::new(corner.row, corner.col)) == Some(&corner.position())
+        };
+        let is_confirmed = labelled.panel == grid.panel
+            && labelled.target == grid.target
+            && labelled.corners.len() == corners.len()
+            && labelled.corners.iter().all(is_equal);
+        grid.tags.clone_from(&labelled.tags);
+        is_confirmed
+    }
+
+    /// Returns whether a grid shows all corners of the only panel of the target.
+    fn is_whole(&self, grid: &Grid) -> bool {
+        self.labels.whole().is_some_and(|whole| whole.corners() == grid.corners.len())
+    }
+
+    /// Returns the missing corners next to those of a grid that are predicted in the image.
+    fn visible_beside(&self, image: ImageView, grid: &Grid) -> impl Iterator<Item = Vertex> {
+        let mut beside = BTreeSet::new();
+        if let Some(panel) = self.labels.panel_of(grid)
+            && grid.corners.len() < panel.corners.len()
+        {
+            let vertex = |corner: &GridCorner| Vertex::new(corner.row, corner.col);
+            let known: BTreeSet<Vertex> = grid.corners.iter().map(vertex).collect();
+            let neighbours = known.iter().flat_map(|&vertex| grid.kind.neighbours(vertex));
+            let missing = neighbours
+                .filter(|vertex| panel.corners.contains(vertex) && !known.contains(vertex));
+            beside.extend(missing);
+            let predicted = Prediction::from(grid);
+            let margin_px = CLEAR_EDGES * grid.edge_px().unwrap_or(0.0);
+            beside.retain(|&vertex| {
+                let place = predicted.at(vertex);
+                place.is_some_and(|(place, _)| is_inside(image, place, margin_px))
+            });
+        }
+        beside.into_iter()
+    }
+}
+
+impl TrackedGrid {
+    /// Creates it for a grid, with its displacements since the last image of a track.
+    fn after(grid: &Grid, before: Option<&Track>) -> Self {
+        let same = |tracked: &&TrackedGrid| {
+            (tracked.grid.panel, &tracked.grid.target) == (grid.panel, &grid.target)
+        };
+        let last = before.and_then(|track| track.grids.iter().find(same));
+        let last = last.into_iter().flat_map(|tracked| &tracked.grid.corners);
+        let last: BTreeMap<Vertex, DVec2> =
+            last.map(|c| (Vertex::new(c.row, c.col), c.position())).collect();
+        let step = |corner: &GridCorner| {
+            let vertex = Vertex::new(corner.row, corner.col);
+            Some((vertex, corner.position() - *last.get(&vertex)?))
+        };
+        let steps = grid.corners.iter().filter_map(step).collect();
+        Self { grid: grid.clone(), steps, absent: BTreeSet::new() }
+    }
+
+    /// Returns the grid with its corners where they are if they have moved like before.
+    fn predicted(&self) -> Grid {
+        let mut grid = self.grid.clone();
+        let along = |of: fn(&DVec2) -> f64| median(self.steps.values().map(of).collect());
+        let usual = along(|step| step.x).zip(along(|step| step.y)).unwrap_or_default();
+        for corner in &mut grid.corners {
+            let step = self.steps.get(&Vertex::new(corner.row, corner.col)).copied();
+            corner.move_to(corner.position() + step.unwrap_or(usual.into()));
+            corner.cov = None;
+        }
+        grid
+    }
+}
+
+/// Returns the affine displacement that most of these points agree with, each given with its displacement, px; `None` if
+/// they are fewer than `least`.
+fn affine_motion(
+    mut points: Vec<(DVec2, DVec2)>,
+    agrees_px: f64,
+    least: f64,
+) -> Option<impl Fn(DVec2) -> DVec2> {
+    let middle_of = |of: fn(&(DVec2, DVec2)) -> f64| median(points.iter().map(of).collect());
+    let middle = DVec2::new(middle_of(|p| p.0.x)?, middle_of(|p| p.0.y)?);
+    let usual = DVec2::new(middle_of(|p| p.1.x)?, middle_of(|p| p.1.y)?);
+    let terms = move |place: DVec2| Vector3::new(1.0, place.x - middle.x, place.y - middle.y);
+    let mut motion = [usual.x, usual.y].map(|first| Vector3::new(first, 0.0, 0.0));
+    for round in 0..ROUNDS {
+        let mut off_px: Vec<f64> = Vec::new();
+        for (place, way) in &points {
+            let [x, y] = motion.map(|motion| motion.dot(&terms(*place)));
+            off_px.push(way.distance(DVec2::new(x, y)));
+        }
+        // The first motion is the same everywhere, so parts of a board that turns disagree with it.
+        let most_px = agrees_px.max(3.0 * median(off_px.clone())?);
+        let most_px = if round + 1 < ROUNDS { most_px } else { agrees_px };
+        let mut off_px = off_px.into_iter();
+        points.retain(|_| off_px.next().is_some_and(|off_px| off_px <= most_px));
+        if (points.len() as f64) < least.max(3.0) {
+            return None;
+        }
+        let (mut normal, mut right) = (Matrix3::zeros(), [Vector3::zeros(); 2]);
+        for (place, way) in &points {
+            let terms = terms(*place);
+            normal += terms * terms.transpose();
+            right[0] += way.x * terms;
+            right[1] += way.y * terms;
+        }
+        let factor = normal.cholesky()?;
+        motion = right.map(|right| factor.solve(&right));
+    }
+    Some(move |place: DVec2| {
+        let [x, y] = motion.map(|motion| motion.dot(&terms(place)));
+        DVec2::new(x, y)
+    })
+}
+
+/// Returns the shortest distance of neighbours in a grid, px.
+fn shortest_edge_px(grid: &Grid) -> f64 {
+    let places: BTreeMap<Vertex, DVec2> =
+        grid.corners.iter().map(|c| (Vertex::new(c.row, c.col), c.position())).collect();
+    let edges = places.iter().flat_map(|(&vertex, place)| {
+        let next = grid.kind.neighbours(vertex);
+        next.filter_map(|next| Some(places.get(&next)?.distance(*place))).collect::<Vec<_>>()
+    });
+    edges.fold(f64::INFINITY, f64::min)
+}
+
+fn is_inside(image: ImageView, place: DVec2, margin_px: f64) -> bool {
+    let size = DVec2::new(image.width() as f64, image.height() as f64) - 1.0;
+    (place.min(size - place)).min_element() >= margin_px
+}
