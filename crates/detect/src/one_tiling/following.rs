@@ -62,6 +62,8 @@ pub(crate) struct Track {
     /// Noise of the corners in the image from which the optics were estimated.
     noise: f64,
     blurs: Vec<Option<f64>>,
+    /// Whether the last image had the same noise under these optics.
+    is_steady: bool,
     /// Number of images since the last search.
     age: usize,
 }
@@ -71,8 +73,8 @@ struct TrackedGrid {
     grid: Grid,
     /// Displacements since the image before, px.
     steps: BTreeMap<Vertex, DVec2>,
-    /// Corners in the image that the last search did not find.
-    absent: BTreeSet<Vertex>,
+    /// Corners in the image that the last search did not find, and whether the polynomial found something there.
+    absent: BTreeMap<Vertex, bool>,
 }
 
 impl OneTiling {
@@ -93,10 +95,17 @@ impl OneTiling {
             return None;
         }
         let tracked = grids.iter().map(|grid| TrackedGrid {
-            absent: self.visible_beside(image, grid).collect(),
+            absent: self.missing_beside(image, grid),
             ..TrackedGrid::after(grid, before)
         });
-        Some(Track { grids: tracked.collect(), optics, noise: noise?, blurs, age: 0 })
+        Some(Track {
+            grids: tracked.collect(),
+            optics,
+            noise: noise?,
+            blurs,
+            is_steady: true,
+            age: 0,
+        })
     }
 
     /// Returns the detection of the next image, and the track from there. Returns `None` if the image has to be searched.
@@ -115,25 +124,18 @@ impl OneTiling {
             track.grids.iter().map(|tracked| self.moved(frame, tracked)).collect();
         let mut grids = moved?;
         let appears = |(grid, tracked): (&Grid, &TrackedGrid)| {
-            self.visible_beside(frame.image, grid).any(|vertex| !tracked.absent.contains(&vertex))
+            let beside = self.missing_beside(frame.image, grid);
+            beside.into_iter().any(|(vertex, is_seen)| match tracked.absent.get(&vertex) {
+                Some(was_seen) => is_seen && !was_seen,
+                None => true,
+            })
         };
         if grids.iter().zip(&track.grids).any(appears) {
             return None;
         }
         timing.lap("follow");
         let counts: Vec<usize> = grids.iter().map(|grid| grid.corners.len()).collect();
-        let start = grids.clone();
-        let mut fitter = CornerFitter::default();
-        let Track { optics, noise, blurs, .. } = track;
-        let mut refined = self.refine_again(&mut fitter, frame.image, &mut grids, optics, blurs);
-        let ratio = refined.noise? / noise;
-        if !(1.0 / MAX_NOISE_RATIO..=MAX_NOISE_RATIO).contains(&ratio) {
-            // Exposure, motion or focus has changed.
-            grids = start;
-            refined = self.refine(&mut fitter, frame, &mut grids);
-        } else {
-            refined.noise = Some(*noise);
-        }
+        let (refined, is_steady) = self.refine_moved(frame, &mut grids, track);
         timing.lap("refine");
         let is_kept =
             |(grid, count): (&Grid, &usize)| grid.corners.len() as f64 >= MIN_KEPT * *count as f64;
@@ -149,9 +151,27 @@ impl OneTiling {
                 ..TrackedGrid::after(grid, Some(track))
             });
             let Shared { optics, blurs, .. } = refined;
-            Track { grids: tracked.collect(), optics, noise, blurs, age: track.age + 1 }
+            Track { grids: tracked.collect(), optics, noise, blurs, is_steady, age: track.age + 1 }
         });
         Some((found, next))
+    }
+
+    /// Refines grids near their corners, under the optics of an earlier image unless exposure, motion or focus has changed.
+    /// Returns whether it has not.
+    fn refine_moved(&self, frame: Frame, grids: &mut Vec<Grid>, track: &Track) -> (Shared, bool) {
+        let mut fitter = CornerFitter::default();
+        let Track { optics, noise, blurs, .. } = track;
+        let start = grids.clone();
+        if track.is_steady {
+            let refined = self.refine_again(&mut fitter, frame.image, grids, optics, blurs);
+            if refined.noise.is_some_and(|now| is_about(now, *noise)) {
+                return (Shared { noise: Some(*noise), ..refined }, true);
+            }
+            *grids = start;
+        }
+        let refined = self.refine(&mut fitter, frame, grids);
+        let is_steady = refined.noise.is_some_and(|now| is_about(now, *noise));
+        (refined, is_steady)
     }
 
     /// Returns a grid with its corners at the positions to which they have moved in this image; `None` if they are not
@@ -230,26 +250,28 @@ impl OneTiling {
         self.labels.whole().is_some_and(|whole| whole.corners() == grid.corners.len())
     }
 
-    /// Returns the missing corners next to those of a grid that are predicted in the image.
-    fn visible_beside(&self, image: ImageView, grid: &Grid) -> impl Iterator<Item = Vertex> {
-        let mut beside = BTreeSet::new();
-        if let Some(panel) = self.labels.panel_of(grid)
-            && grid.corners.len() < panel.corners.len()
-        {
-            let vertex = |corner: &GridCorner| Vertex::new(corner.row, corner.col);
-            let known: BTreeSet<Vertex> = grid.corners.iter().map(vertex).collect();
-            let neighbours = known.iter().flat_map(|&vertex| grid.kind.neighbours(vertex));
-            let missing = neighbours
-                .filter(|vertex| panel.corners.contains(vertex) && !known.contains(vertex));
-            beside.extend(missing);
-            let predicted = Prediction::from(grid);
-            let margin_px = CLEAR_EDGES * grid.edge_px().unwrap_or(0.0);
-            beside.retain(|&vertex| {
-                let place = predicted.at(vertex);
-                place.is_some_and(|(place, _)| is_inside(image, place, margin_px))
-            });
+    /// Returns the missing corners next to those of a grid that are predicted in the image, and whether the polynomial finds
+    /// something there.
+    fn missing_beside(&self, image: ImageView, grid: &Grid) -> BTreeMap<Vertex, bool> {
+        let Some(panel) = self.labels.panel_of(grid) else { return BTreeMap::new() };
+        if grid.corners.len() == panel.corners.len() {
+            return BTreeMap::new();
         }
-        beside.into_iter()
+        let vertex = |corner: &GridCorner| Vertex::new(corner.row, corner.col);
+        let known: BTreeSet<Vertex> = grid.corners.iter().map(vertex).collect();
+        let neighbours = known.iter().flat_map(|&vertex| grid.kind.neighbours(vertex));
+        let missing: BTreeSet<Vertex> = neighbours
+            .filter(|vertex| panel.corners.contains(vertex) && !known.contains(vertex))
+            .collect();
+        let predicted = Prediction::from(grid);
+        let margin_px = CLEAR_EDGES * grid.edge_px().unwrap_or(0.0);
+        let look = |vertex: Vertex| {
+            let (place, sd_px) = predicted.at(vertex)?;
+            let found = self.refiner.found(image, place);
+            let is_near = |found: DVec2| found.distance(place) <= AGREES_PX.max(3.0 * sd_px);
+            is_inside(image, place, margin_px).then(|| (vertex, found.is_some_and(is_near)))
+        };
+        missing.into_iter().filter_map(look).collect()
     }
 }
 
@@ -268,7 +290,7 @@ impl TrackedGrid {
             Some((vertex, corner.position() - *last.get(&vertex)?))
         };
         let steps = grid.corners.iter().filter_map(step).collect();
-        Self { grid: grid.clone(), steps, absent: BTreeSet::new() }
+        Self { grid: grid.clone(), steps, absent: BTreeMap::new() }
     }
 
     /// Returns the grid with its corners where they are if they have moved like before.
@@ -325,6 +347,11 @@ fn affine_motion(
         let [x, y] = motion.map(|motion| motion.dot(&terms(place)));
         DVec2::new(x, y)
     })
+}
+
+/// Returns whether two noises are equal up to their scatter.
+fn is_about(noise: f64, other: f64) -> bool {
+    (1.0 / MAX_NOISE_RATIO..=MAX_NOISE_RATIO).contains(&(noise / other))
 }
 
 /// Returns the shortest distance of neighbours in a grid, px.
