@@ -58,6 +58,7 @@ __all__ = [
     "Tag",
     "Target",
     "Tetrahedron",
+    "Tracker",
     "Truth",
     "Verdict",
     "View",
@@ -730,6 +731,14 @@ class Detector:
     @property
     def targets(self) -> list[Target]: ...
     def __reduce__(self) -> tuple[Any, ...]: ...
+
+@final
+class Tracker:
+    def __new__(cls, detector: Detector) -> Tracker: ...
+    def detect(self, image: NDArray[Any], *, name: str = "") -> Detection: ...
+    @property
+    def has_followed(self) -> bool: ...
+    def reset(self) -> None: ...
 
 @final
 class Pose:

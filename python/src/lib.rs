@@ -77,6 +77,8 @@ mod _core {
     #[pymodule_export]
     use super::see::rendering::{Truth, render};
     #[pymodule_export]
+    use super::see::tracker::Tracker;
+    #[pymodule_export]
     use super::targets::boards::{Board, Checkerboard};
     #[pymodule_export]
     use super::targets::families::{Family, search_family};

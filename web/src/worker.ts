@@ -137,10 +137,10 @@ async function pictureOf(photograph: Photo.Photograph): Promise<See.Picture> {
   return Picture.of_grey(width, height, photograph.is_deep(), photograph.grey(), photograph.orientation());
 }
 
-/** Detects in an image; returns the results and the time taken. */
-function detect(finder: See.Finder, picture: See.Picture, name: string, also: (found: See.Found) => void = () => undefined): Seen {
+/** Detects in an image by `find`; returns the results and the time taken. */
+function detect(find: () => See.Found, also: (found: See.Found) => void = () => undefined): Seen {
   const begin = performance.now();
-  const found = finder.find(picture, name);
+  const found = find();
   const ms = performance.now() - begin;
   try {
     also(found);
@@ -207,7 +207,7 @@ const calls = {
     const [{ Photograph }, finder] = await Promise.all([photographer(), finderOf(sought, ink)]);
     return using(new Photograph(name, bytes), async (photograph) => {
       const [width = 0, height = 0] = photograph.size();
-      const seen = await using(await pictureOf(photograph), (picture) => detect(finder, picture, name));
+      const seen = await using(await pictureOf(photograph), (picture) => detect(() => finder.find(picture, name)));
       // One byte per pixel, as all photographs are kept in memory.
       const colours = photograph.shown();
       const grey = new Uint8Array(width * height);
@@ -273,7 +273,8 @@ const calls = {
     const rgba = new Uint8Array(pixels.buffer, pixels.byteOffset, pixels.byteLength);
     return using(Picture.of_colours(width, height, rgba), (picture) => {
       let keep = false;
-      const seen = detect(finder, picture, name, (found) => (keep = watcher?.observe(found) ?? false));
+      const follow = () => finder.follow(picture, name);
+      const seen = detect(follow, (found) => (keep = watcher?.observe(found) ?? false));
       const held = guide ? (JSON.parse(guide.observe(time, seen.json)) as HoldStatus) : null;
       return { ...seen, keep, held, pixels };
     });

@@ -78,3 +78,89 @@ impl Tracker {
         found
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use glam::{DVec2, DVec3};
+
+    use super::*;
+    use deltille_core::camera::{Camera, Pose};
+    use deltille_core::detection::GridCorner;
+    use deltille_core::raster::Gray;
+    use deltille_core::targets::BoardSpec;
+    use deltille_layout::Printing;
+    use deltille_layout::synth::{Light, scene_of_sheet};
+
+    const SIZE: [u32; 2] = [800, 600];
+
+    /// Renders a board from a camera that moves by these mm, and returns its tracker.
+    fn video(spec: BoardSpec, ways: &[DVec2]) -> (Tracker, Vec<Gray<u8>>) {
+        let board = Printing::new("board", spec).unwrap();
+        let sheets = board.draw().unwrap().sheets;
+        let scene = scene_of_sheet(&board, &sheets[0], 0);
+        let camera = Camera::pinhole(SIZE[0], SIZE[1], 1.0);
+        let shown = |(i, way): (usize, &DVec2)| {
+            let middle = DVec3::new(90.0 + way.x, 70.0 + way.y, 0.0);
+            let from = middle + DVec3::new(20.0, -50.0, 330.0);
+            let pose = Pose::looking_at(from, middle, DVec3::Y);
+            let light = Light::default().noise(0.008).seed(i as u64);
+            scene.render(&camera, &pose, &light).map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
+        };
+        let images = ways.iter().enumerate().map(shown).collect();
+        (Tracker::new(Detector::new(&board.target).unwrap()), images)
+    }
+
+    fn corners(found: &Detection) -> BTreeMap<(Option<u32>, i32, i32), GridCorner> {
+        let of_grids = found.grids.iter().flat_map(|grid| {
+            grid.corners.iter().map(|corner| ((grid.panel, corner.row, corner.col), *corner))
+        });
+        of_grids.collect()
+    }
+
+    /// Follows the board while it moves smoothly, also after a jump by the distance of two corners, and finds what detection
+    /// finds.
+    #[test]
+    fn corners_are_those_of_single_images() {
+        let edge_mm = 20.0;
+        let smooth = |i: f64| DVec2::new(30.0 * (i / 4.0).sin(), 20.0 * (i / 3.0).cos());
+        let mut ways: Vec<DVec2> = (0..8).map(|i| smooth(i.into())).collect();
+        let jump = DVec2::new(edge_mm, 0.0);
+        ways.extend((8..12).map(|i| smooth(i.into()) + jump));
+        for spec in [BoardSpec::deltille(7, 8, edge_mm), BoardSpec::checkerboard(7, 8, edge_mm)] {
+            let (mut tracker, images) = video(spec, &ways);
+            let mut followed = Vec::new();
+            for (i, image) in images.iter().enumerate() {
+                let (found, alone) =
+                    (tracker.detect(image, ""), tracker.detector.detect(image, ""));
+                let (found, alone) = (corners(&found), corners(&alone));
+                assert!(alone.len() > 40 && found.keys().eq(alone.keys()), "{i}");
+                for (corner, other) in found.values().zip(alone.values()) {
+                    let [xx, _, yy] = other.cov.unwrap();
+                    let off_px = corner.position().distance(other.position());
+                    assert!(off_px < 1.5 * (xx + yy).sqrt(), "{i}: {corner:?} {other:?}");
+                }
+                followed.push(tracker.has_followed());
+            }
+            assert!(!followed[0] && !followed[8], "{followed:?}");
+            assert!(followed.iter().filter(|followed| **followed).count() >= 8, "{followed:?}");
+        }
+    }
+
+    /// A board that disappears is not followed, and found again.
+    #[test]
+    fn a_board_that_is_gone_is_not_followed() {
+        let (mut tracker, images) = video(BoardSpec::deltille(7, 8, 20.0), &[DVec2::ZERO; 4]);
+        let empty = Gray::from_fn(SIZE[0] as usize, SIZE[1] as usize, |x, y| (x * 7 + y * 3) as u8);
+        for (image, grids) in [(&images[0], 1), (&images[1], 1), (&empty, 0), (&images[2], 1)] {
+            assert_eq!(tracker.detect(image, "").grids.len(), grids);
+        }
+        assert!(!tracker.has_followed());
+        tracker.detect(&images[3], "");
+        assert!(tracker.has_followed());
+        tracker.reset();
+        tracker.detect(&images[3], "");
+        assert!(!tracker.has_followed());
+    }
+}

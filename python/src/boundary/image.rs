@@ -123,7 +123,15 @@ impl<'py> Picture<'py> {
     }
 
     /// Returns the view that detectors take.
-    pub fn view(&self) -> Option<ImageView<'_>> {
+    ///
+    /// # Errors
+    /// Returns an error if the memory layout of the array is not supported.
+    pub fn viewed(&self) -> PyResult<ImageView<'_>> {
+        let unsupported = "the memory layout of the array is not supported";
+        self.view().ok_or_else(|| raised::ImageError::new_err(unsupported))
+    }
+
+    fn view(&self) -> Option<ImageView<'_>> {
         Some(match self {
             Self::U8(pixels) => rows(&pixels.as_array())?.into(),
             Self::U16(pixels) => rows(&pixels.as_array())?.into(),

@@ -34,10 +34,11 @@ use crate::targets::target::Target;
 /// allow_mirrored : bool, optional
 ///     Label mirrored grids, too.
 /// max_errors : int, optional
-/// Maximum number of corrected cells per tag; defaults to the number that the family always
-/// corrects. refine : str, optional Subpixel method: ``"model"``, with covariances, or
-/// ``"polynomial"``, the method of the paper. max_pixels : int, optional Maximum number of pixels
-/// of an image.
+///     Maximum number of corrected cells per tag; defaults to the number that the family always corrects.
+/// refine : str, optional
+///     Subpixel method: ``"model"``, with covariances, or ``"polynomial"``, the method of the paper.
+/// max_pixels : int, optional
+///     Maximum number of pixels of an image.
 ///
 /// Raises
 /// ------
@@ -54,9 +55,9 @@ use crate::targets::target::Target;
 #[pyclass(frozen, module = "deltille")]
 #[derive(Clone)]
 pub struct Detector {
-    detector: Arc<detect::Detector>,
-    targets: Vec<Target>,
-    limits: Limits,
+    pub(super) detector: Arc<detect::Detector>,
+    pub(super) targets: Vec<Target>,
+    pub(super) limits: Limits,
     asked: Arc<Asked>,
 }
 
@@ -241,11 +242,7 @@ impl Detector {
     #[pyo3(signature = (image, *, name = ""))]
     fn detect(&self, py: Python<'_>, image: &Bound<'_, PyAny>, name: &str) -> PyResult<Detection> {
         let picture = Picture::of(image, &self.limits)?;
-        let Some(view) = picture.view() else {
-            return Err(raised::ImageError::new_err(
-                "the memory layout of the array is not supported",
-            ));
-        };
+        let view = picture.viewed()?;
         let found = unlocked(py, || self.detector.detect(view, name))?;
         Ok(Detection { found: Arc::new(found), targets: self.targets.clone() })
     }

@@ -12,3 +12,4 @@ pub mod detection;
 pub mod detector;
 pub mod pose;
 pub mod rendering;
+pub mod tracker;

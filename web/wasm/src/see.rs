@@ -5,7 +5,7 @@ use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
 use deltille_core::raster::{AnyGray, FileNotes, Gray, grey_of_colours};
 use deltille_core::targets::Target;
-use deltille_detect::{Detector, DetectorConfig};
+use deltille_detect::{Detector, DetectorConfig, Tracker};
 use deltille_files::export::{csv, detection, orpc};
 use wasm_bindgen::prelude::*;
 
@@ -64,6 +64,8 @@ fn wrong_size() -> JsError {
 #[wasm_bindgen]
 pub struct Finder {
     detector: Detector,
+    /// Follows targets in a video, once one is shown.
+    tracker: Option<Tracker>,
     target: Option<Target>,
 }
 
@@ -93,7 +95,7 @@ impl Finder {
         let mut target = Target::from_json(target).raise()?;
         set_family(&mut target, family)?;
         let detector = Detector::new(&target).raise()?;
-        Ok(Self { detector, target: Some(target) })
+        Ok(Self { detector, tracker: None, target: Some(target) })
     }
 
     /// Makes a finder for untagged boards of a tiling, `deltille` or `checker`. If rows and columns are given (not 0), boards
@@ -109,7 +111,7 @@ impl Finder {
         };
         let size = (rows > 0 && cols > 0).then_some((rows, cols));
         let detector = Detector::for_grid(kind, size, DetectorConfig::default());
-        Ok(Self { detector, target: None })
+        Ok(Self { detector, tracker: None, target: None })
     }
 
     /// Combines the ink estimates of several images of one print (JSON list) into one. Returns it as JSON and in words, or
@@ -129,12 +131,20 @@ impl Finder {
     /// Throws if `ink` is not a valid ink estimate.
     pub fn with_ink(self, ink: &str) -> Result<Self, JsError> {
         let ink: InkEstimate = serde_json::from_str(ink).raise()?;
-        Ok(Self { detector: self.detector.with_ink(ink), ..self })
+        Ok(Self { detector: self.detector.with_ink(ink), tracker: None, ..self })
     }
 
     /// Detects targets in an image.
     pub fn find(&self, picture: &Picture, name: &str) -> Found {
         let mut detection = self.detector.detect(&picture.image, name);
+        detection.file = picture.notes.clone();
+        Found { detection, target: self.target.clone() }
+    }
+
+    /// Detects targets in the next image of a video.
+    pub fn follow(&mut self, picture: &Picture, name: &str) -> Found {
+        let tracker = self.tracker.get_or_insert_with(|| Tracker::new(self.detector.clone()));
+        let mut detection = tracker.detect(&picture.image, name);
         detection.file = picture.notes.clone();
         Found { detection, target: self.target.clone() }
     }
