@@ -42,7 +42,7 @@ impl Tracker {
     #[new]
     fn new(detector: &Detector) -> Self {
         let tracker = Mutex::new(detect::Tracker::new((*detector.detector).clone()));
-        Self { tracker, targets: detector.targets.clone(), limits: detector.limits.clone() }
+        Self { tracker, targets: detector.targets.clone(), limits: detector.limits }
     }
 
     /// Detects the target in the next image.
