@@ -3,7 +3,7 @@
 use super::config::DetectorConfig;
 use super::levels::{MIN_LEVEL_SIDE, levels_of};
 use super::one_tiling::following::Track;
-use super::one_tiling::{Frame, OneTiling, Timing};
+use super::one_tiling::{Frame, OneTiling, Search, Timing};
 use super::scene::{SceneError, check_detectable, check_distinct};
 use crate::labels::grid_labels::Labels;
 use crate::refine::clearance::TagAreas;
@@ -218,12 +218,13 @@ impl Detector {
     pub(crate) fn search(
         &self,
         frame: Frame,
+        how: Search,
         before: &[Option<Track>],
         name: &str,
     ) -> (Detection, Vec<Option<Track>>) {
         let mut tracks = Vec::new();
         let found = self.tilings().enumerate().map(|(i, of)| {
-            let (found, shared) = of.search(frame, of.timing(), name);
+            let (found, shared) = of.search(frame, how, of.timing(), name);
             let before = before.get(i).and_then(Option::as_ref);
             tracks.push(of.track(frame.image, &found.grids, shared, before));
             found

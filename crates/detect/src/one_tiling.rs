@@ -66,6 +66,15 @@ pub(super) struct Frame<'a> {
     pub(super) pyramid: &'a Pyramid<'a>,
 }
 
+/// How thoroughly an image is searched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Search {
+    /// Only in the image itself if it shows no grid.
+    Quick,
+    /// Also in transformed images.
+    Thorough,
+}
+
 /// Grids, each with the reason why it has no labels.
 type Judged = Vec<(Grid, Option<Reason>)>;
 
@@ -149,14 +158,20 @@ impl OneTiling {
 
     /// Returns the detection of an image. `name` is copied to the result.
     pub(super) fn detect(&self, frame: Frame, timing: Timing, name: &str) -> Detection {
-        self.search(frame, timing, name).0
+        self.search(frame, Search::Thorough, timing, name).0
     }
 
     /// Returns the detection of an image, and what its corners have in common.
-    pub(super) fn search(&self, frame: Frame, timing: Timing, name: &str) -> (Detection, Shared) {
+    pub(super) fn search(
+        &self,
+        frame: Frame,
+        how: Search,
+        timing: Timing,
+        name: &str,
+    ) -> (Detection, Shared) {
         match &self.finder {
-            Finder::Deltille(finder) => self.search_with(finder, frame, timing, name),
-            Finder::Checker(finder) => self.search_with(finder, frame, timing, name),
+            Finder::Deltille(finder) => self.search_with(finder, frame, how, timing, name),
+            Finder::Checker(finder) => self.search_with(finder, frame, how, timing, name),
         }
     }
 
@@ -169,6 +184,7 @@ impl OneTiling {
         &self,
         finder: &SaddleFinder<N>,
         frame: Frame,
+        how: Search,
         mut timing: Timing,
         name: &str,
     ) -> (Detection, Shared) {
@@ -176,7 +192,7 @@ impl OneTiling {
         let whole = self.whole_on_coarser_level(finder, frame, &mut timing);
         let Found { grids, shared, left_out, saddles } = match whole {
             Some((grids, shared)) => Found { grids, shared, left_out: Vec::new(), saddles: 0 },
-            None => self.all_grids(finder, frame, &mut timing),
+            None => self.all_grids(finder, frame, how, &mut timing),
         };
         let mut reasons = if grids.is_empty() {
             let nothing = || nothing_found::<N>(pyramid, saddles);
@@ -273,6 +289,7 @@ impl OneTiling {
         &self,
         finder: &SaddleFinder<N>,
         frame: Frame,
+        how: Search,
         timing: &mut Timing,
     ) -> Found {
         let Frame { image, pyramid } = frame;
@@ -292,7 +309,9 @@ impl OneTiling {
         let mut grids = self.plausible::<N>(frame, &found, &mut left_out);
         let of_found = left_out.len();
         timing.lap("labels");
-        let may_show_board = self.labels.are_wanted()
+        let is_worth = how == Search::Thorough || !grids.is_empty();
+        let may_show_board = is_worth
+            && self.labels.are_wanted()
             && (!grids.is_empty() || self.may_show_board(pyramid, &saddles));
         if may_show_board && self.may_lack_corners(&grids) {
             let found = enlarged_grids(finder, image, pyramid, self.labels.whole());
@@ -308,7 +327,7 @@ impl OneTiling {
             grids = with_larger_panels(grids, self.plausible::<N>(frame, &foreshortened, left_out));
             timing.lap("foreshortened");
         }
-        if self.is_sought() && !grids.iter().any(|found| self.is_identified(found)) {
+        if is_worth && self.is_sought() && !grids.iter().any(|found| self.is_identified(found)) {
             let found = grids_of_moved_edges(finder, pyramid, self.labels.whole());
             let mut identified = self.plausible::<N>(frame, &found, &mut Vec::new());
             identified.iter_mut().for_each(|(grid, _)| centre(frame.image, grid));

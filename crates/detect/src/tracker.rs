@@ -2,8 +2,8 @@
 
 use super::detector::Detector;
 use super::levels::{MIN_LEVEL_SIDE, levels_of};
-use super::one_tiling::Frame;
 use super::one_tiling::following::Track;
+use super::one_tiling::{Frame, Search};
 use deltille_core::detection::Detection;
 use deltille_core::raster::{ImageView, Pyramid};
 
@@ -13,7 +13,8 @@ use deltille_core::raster::{ImageView, Pyramid};
 /// board, have to confirm their labels with the evidence that [`Detector`] requires. If that fails, if more of a target
 /// comes into view, and from time to time if not all of it is visible, the image is searched like a single one. Corners agree
 /// with those of [`Detector`] within a fraction of their standard deviations. [`Grid::tags`](crate::Grid::tags) contains
-/// only the tags that were read again.
+/// only the tags that were read again. While no grid is in view, nine of ten images are not searched for boards that are
+/// strongly foreshortened, very small, or have moved edges.
 ///
 /// ```
 /// use deltille_core::raster::Gray;
@@ -37,12 +38,17 @@ pub struct Tracker {
     /// Width and height of the last image, px.
     size: [usize; 2],
     has_followed: bool,
+    /// Number of images without a grid since the last one that was searched thoroughly.
+    idle: usize,
 }
+
+/// Number of images without a grid of which one is searched thoroughly.
+const THOROUGH_EVERY: usize = 10;
 
 impl Tracker {
     /// Creates a tracker of the targets of a detector.
     pub fn new(detector: Detector) -> Self {
-        Self { detector, tracks: Vec::new(), size: [0; 2], has_followed: false }
+        Self { detector, tracks: Vec::new(), size: [0; 2], has_followed: false, idle: 0 }
     }
 
     /// Detects the targets in the next image. `name` is copied to the result.
@@ -58,6 +64,7 @@ impl Tracker {
     /// Forgets the images so far. The next one is searched.
     pub fn reset(&mut self) {
         self.tracks.clear();
+        self.idle = 0;
     }
 
     fn detect_view(&mut self, image: ImageView, name: &str) -> Detection {
@@ -71,8 +78,10 @@ impl Tracker {
         let frame = Frame { image, pyramid: &pyramid };
         let followed = self.detector.follow(frame, &self.tracks, name);
         self.has_followed = followed.is_some();
-        let (mut found, tracks) =
-            followed.unwrap_or_else(|| self.detector.search(frame, &self.tracks, name));
+        let how = if self.idle == 0 { Search::Thorough } else { Search::Quick };
+        let search = || self.detector.search(frame, how, &self.tracks, name);
+        let (mut found, tracks) = followed.unwrap_or_else(search);
+        self.idle = if found.grids.is_empty() { (self.idle + 1) % THOROUGH_EVERY } else { 0 };
         self.tracks = tracks;
         timing.add_to(&mut found.timing_ms);
         found
