@@ -36,7 +36,7 @@ def main() -> None:
     board = deltille.Board(10, 11, edge_mm=20, name="desk")
     # Without a calibration, a guess is good enough for drawing: a horizontal field of view of 60°.
     camera = deltille.Camera(960, 720, 960 / 2 / numpy.tan(numpy.radians(30)))
-    detector = deltille.Detector(board)
+    tracker = deltille.Tracker(deltille.Detector(board))
     with tempfile.TemporaryDirectory() as folder:
         source = arguments[0] if arguments else made_here(board, camera, Path(folder))
         video = cv2.VideoCapture(int(source) if source.isdigit() else source)
@@ -47,7 +47,7 @@ def main() -> None:
                 break
             start = time.perf_counter()
             # OpenCV's colours are blue, green, red; this makes a view, not a copy.
-            found = detector.detect(picture[..., ::-1], name=f"frame {frames}")
+            found = tracker.detect(picture[..., ::-1], name=f"frame {frames}")
             located = deltille.pose(found, camera) if found else None
             milliseconds = 1e3 * (time.perf_counter() - start)
             if located:

@@ -50,6 +50,25 @@ def test_many_photographs_agree_with_the_program(program, root, tmp_path, folder
     assert [result.to_json() for result in found] == texts
 
 
+def test_a_tracker_finds_what_a_detector_finds(root):
+    detector = deltille.Detector(grid="deltille", rows=10, cols=11)
+    tracker = deltille.Tracker(detector)
+    photograph = detector.detect_file(root / "tests/photographs/robot-hand-0108.png")
+    cv2 = pytest.importorskip("cv2")
+    array = cv2.imread(str(root / "tests/photographs/robot-hand-0108.png"), cv2.IMREAD_UNCHANGED)
+    for followed in (False, True, True):
+        found = tracker.detect(array)
+        assert tracker.has_followed is followed
+        assert (abs(found.pixels - photograph.pixels) < 0.01).all()
+    assert not tracker.detect(numpy.zeros_like(array)) and not tracker.has_followed
+    tracker.detect(array)
+    tracker.reset()
+    tracker.detect(array)
+    assert not tracker.has_followed
+    with pytest.raises(deltille.ImageError):
+        tracker.detect(numpy.zeros(3))
+
+
 def test_a_detection_has_arrays(detections, board):
     found = detections[0]
     assert len(found) == 56 and not found.mirrored

@@ -269,6 +269,41 @@ fn messages_of_detect() {
     page.is("detect");
 }
 
+/// Frames in which a board is followed have the corners of single images.
+#[test]
+fn a_board_is_followed_through_a_video() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = Path::new(crate::common::REPOSITORY);
+    for i in 0..3 {
+        let photograph = root.join("tests/photographs/robot-hand-0108.png");
+        std::fs::copy(photograph, folder.path().join(format!("{i}.png"))).unwrap();
+    }
+    let detect = |how: &str, folder_of: &str| -> Vec<serde_json::Value> {
+        let args = format!(
+            "detect --grid deltille --rows 10 --cols 11 --ink none --timing {how} -o {folder_of} *.png"
+        );
+        deltille(folder.path(), &args).success();
+        let read = |i: i32| std::fs::read(folder.path().join(format!("{folder_of}/{i}.json")));
+        (0..3).map(|i| serde_json::from_slice(&read(i).unwrap()).unwrap()).collect()
+    };
+    let (followed, alone) = (detect("--track", "followed"), detect("", "alone"));
+    let is_followed = |found: &serde_json::Value| found["timing_ms"].get("follow").is_some();
+    assert_eq!(followed.iter().map(is_followed).collect::<Vec<_>>(), [false, true, true]);
+    for (found, alone) in followed.iter().zip(&alone) {
+        let corners = |found: &serde_json::Value| found["grids"][0]["corners"].clone();
+        let (found, alone) = (corners(found), corners(alone));
+        let pairs = found.as_array().unwrap().iter().zip(alone.as_array().unwrap());
+        for (corner, other) in pairs {
+            assert_eq!((&corner["row"], &corner["col"]), (&other["row"], &other["col"]));
+            for axis in ["x", "y"] {
+                let off_px = corner[axis].as_f64().unwrap() - other[axis].as_f64().unwrap();
+                assert!(off_px.abs() < 0.01, "{corner} {other}");
+            }
+        }
+        assert_eq!(found.as_array().unwrap().len(), 110);
+    }
+}
+
 /// A stream prints each image before it has read the others, so it does not use the ink estimate of all.
 #[test]
 fn a_stream_notes_that_files_would_have_other_corners() {
