@@ -46,16 +46,25 @@ fn enlarged(image: ImageView) -> Gray<u16> {
         0 => (i / 2).saturating_sub(1),
         _ => (i / 2 + 1).min(size - 1),
     };
+    let mix = |near: f32, next: f32| 0.75 * near + 0.25 * next;
+    let level = |value: f32| (WHITE * value + 0.5) as u16;
     let mut rows = [vec![0.0; width], vec![0.0; width]];
+    // One row of the result before it is enlarged along the row, with the first and the last pixel repeated.
+    let mut between = vec![0.0; width + 2];
     for y in 0..2 * height {
         for (row, y) in rows.iter_mut().zip([y / 2, beside(y, height)]) {
             // All rows lie in the image.
             let _ = image.read_row(0, y, row);
         }
-        let down = |x: usize| 0.75 * rows[0][x] + 0.25 * rows[1][x];
-        for (x, pixel) in enlarged.row_mut(y).iter_mut().enumerate() {
-            let value = 0.75 * down(x / 2) + 0.25 * down(beside(x, width));
-            *pixel = (WHITE * value + 0.5) as u16;
+        let [near, next] = &rows;
+        for (value, (&near, &next)) in between[1..].iter_mut().zip(near.iter().zip(next)) {
+            *value = mix(near, next);
+        }
+        (between[0], between[width + 1]) = (between[1], between[width]);
+        let around = between.windows(3);
+        for (pixels, around) in enlarged.row_mut(y).chunks_exact_mut(2).zip(around) {
+            let (left, here, right) = (around[0], around[1], around[2]);
+            (pixels[0], pixels[1]) = (level(mix(here, left)), level(mix(here, right)));
         }
     }
     enlarged
