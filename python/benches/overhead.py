@@ -43,6 +43,29 @@ def milliseconds(work, repeats: int) -> float:
     return statistics.median(times)
 
 
+def layouts(picture) -> dict[str, numpy.ndarray]:
+    """The image in types and layouts that `detect` converts."""
+    tint = numpy.random.default_rng(1).integers(0, 20, (*picture.shape, 3))
+    colours = numpy.clip(picture[..., None].astype(int) - tint, 0, 255).astype(numpy.uint8)
+    found = {"uint8": picture, "float32": (picture / 255).astype(numpy.float32), "RGB": colours}
+    for name, image in [("uint8", picture), ("RGB", colours)]:
+        found[f"{name}, flipped rows"] = image[::-1].copy()[::-1]
+        found[f"{name}, every second column"] = numpy.repeat(image, 2, axis=1)[:, ::2]
+        found[f"{name}, transposed"] = image.swapaxes(0, 1).copy().swapaxes(0, 1)
+    return found | {"RGB, reversed channels": colours[..., ::-1].copy()[..., ::-1]}
+
+
+def cpu_times(detector, images, repeats: int) -> dict[str, float]:
+    """Median CPU time of a call with each image, ms; the images take turns."""
+    times = {name: [] for name in images}
+    for _ in range(repeats):
+        for name, image in images.items():
+            start = time.process_time()
+            detector.detect(image)
+            times[name].append(1e3 * (time.process_time() - start))
+    return {name: statistics.median(of_image) for name, of_image in times.items()}
+
+
 def rate(detector, board, camera, workers: int) -> float:
     """Images per second with this number of threads; the best of twelve rounds, as the machine may be shared."""
     pictures = [deltille.render(board, camera, eye=(100, -60 + i, 420), seed=i)[0] for i in range(16)]
@@ -82,11 +105,9 @@ def main() -> None:
     found = detector.detect(picture)
     arrays = milliseconds(lambda: (found.pixels, found.ids, found.object_points, found.covariances), 200)
     print(f"arrays of the result: {arrays:.4f} ms")
-    wide = numpy.zeros((1200, 3200), numpy.uint8)
-    wide[:, :1600] = picture
-    print(f"call with a view: {milliseconds(lambda: detector.detect(wide[:, :1600]), arguments.repeats):.2f} ms")
-    turned = numpy.ascontiguousarray(picture.T).T
-    print(f"call with a transposed image, which is copied: {milliseconds(lambda: detector.detect(turned), arguments.repeats):.2f} ms")
+    times = cpu_times(detector, layouts(picture), arguments.repeats)
+    for name, of_call in times.items():
+        print(f"CPU time of a call with {name}: {of_call:.1f} ms")
 
     # The library alone, as measured by its own program.
     program = shutil.which("deltille", path=sysconfig.get_path("scripts"))

@@ -1,6 +1,7 @@
 """Arrays of any layout give the same corners, and invalid arrays raise a clear exception."""
 
 import gc
+import itertools
 import sys
 
 import numpy
@@ -72,15 +73,61 @@ def test_every_layout_gives_the_same_corners(detector, board, camera, layout, dt
     assert (given == before).all()
 
 
-def test_colours_are_converted_to_grey_as_by_the_program(detector, picture, tmp_path):
+def laid_out(picture, order, steps):
+    """A copy whose axes are in this order in memory, and whose elements are these steps apart."""
+    sizes = [abs(step) * size + 1 for step, size in zip(steps, picture.shape, strict=True)]
+    memory = numpy.zeros([sizes[axis] for axis in order], picture.dtype)
+    view = memory.transpose(numpy.argsort(order))[tuple(slice(None, None, step) for step in steps)]
+    view = view[tuple(slice(size) for size in picture.shape)]
+    view[...] = picture
+    return view
+
+
+@pytest.fixture(scope="module")
+def colours(picture):
+    tint = numpy.random.default_rng(1).integers(0, 20, (*picture.shape, 3))
+    return numpy.clip(picture[..., None].astype(int) - tint, 0, 255).astype(numpy.uint8)
+
+
+@pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
+@pytest.mark.parametrize("steps", [(1, 1, 1), (1, 1, -1), (-1, 1, 1), (1, -1, 1), (2, 1, 1), (1, 2, 1), (3, -2, -2)])
+def test_every_layout_of_colours_gives_the_same_corners(detector, colours, order, steps):
+    expected = detector.detect(colours)
+    assert len(expected) > 50
+    given = laid_out(colours, order, steps)
+    assert (given == colours).all()
+    found = detector.detect(given)
+    assert (found.pixels == expected.pixels).all() and (found.covariances == expected.covariances).all()
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "uint16", "float32"])
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+@pytest.mark.parametrize("steps", [(-1, 1), (1, -1), (1, 2), (-2, -3)])
+def test_every_layout_of_grey_values_gives_the_same_corners(detector, picture, dtype, order, steps):
+    full_scale = {"uint8": 1, "uint16": 257, "float32": 1 / 255}[dtype]
+    grey = (picture.astype(float) * full_scale).astype(dtype)
+    expected, found = detector.detect(grey), detector.detect(laid_out(grey, order, steps))
+    assert len(expected) > 50
+    assert (found.pixels == expected.pixels).all() and (found.covariances == expected.covariances).all()
+
+
+def test_colours_are_converted_to_grey_as_by_the_program(detector, colours, tmp_path):
     cv2 = pytest.importorskip("cv2")
-    generator = numpy.random.default_rng(1)
-    tint = generator.integers(0, 20, (*picture.shape, 3))
-    colours = numpy.clip(picture[..., None].astype(int) - tint, 0, 255).astype(numpy.uint8)
     cv2.imwrite(str(tmp_path / "colours.png"), colours[..., ::-1])
     expected = detector.detect_file(tmp_path / "colours.png").pixels
-    for layout in (colours, numpy.asfortranarray(colours), colours[..., ::-1].copy()[..., ::-1], read_only(colours)):
-        assert (detector.detect(layout).pixels == expected).all()
+    assert (detector.detect(colours).pixels == expected).all()
+    assert (detector.detect(read_only(colours)).pixels == expected).all()
+
+
+@pytest.mark.parametrize("at", [(0, 0), (239, 100), (-1, -1)])
+@pytest.mark.parametrize("value", [-1e-7, 1.0000001, numpy.nan, numpy.inf])
+def test_a_single_float_outside_the_range_is_reported(detector, at, value):
+    picture = numpy.full((480, 640), 0.5, numpy.float32)
+    picture[at] = value
+    with pytest.raises(deltille.ImageError, match="float images range from 0"):
+        detector.detect(picture.T)
+    with pytest.raises(deltille.ImageError, match="float images range from 0"):
+        detector.detect(picture)
 
 
 def test_a_view_is_detected_without_a_copy(detector, picture):

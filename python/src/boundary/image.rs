@@ -1,11 +1,8 @@
 //! Converts arrays to images, without a copy if their layout allows.
 
-use std::borrow::Cow;
-
 use deltille::limits::Limits;
-use deltille::photograph::grey_of_colours;
-use deltille::raster::{Gray, ImageView, Intensity, View};
-use numpy::ndarray::{ArrayView2, ArrayView3};
+use deltille::raster::{Colours, Gray, ImageView, Intensity, View};
+use numpy::ndarray::{ArrayView, ArrayView2, ArrayView3, ArrayViewMut2, Axis, Dimension};
 use numpy::{
     Element, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray2,
     PyUntypedArray, PyUntypedArrayMethods, dtype,
@@ -69,8 +66,8 @@ impl<'py> Picture<'py> {
                 return Err(refused(format!("unsupported dtype {kind} for colours")));
             }
             let colours = array.cast::<PyArray3<u8>>()?.try_readonly()?;
-            let grey = grey_of_colours(wide, high, bytes_of(colours.as_array()));
-            return Ok(Self::Grey(grey.ok_or_else(|| refused("unsupported colours".to_owned()))?));
+            let grey = grey_of(&colours.as_array());
+            return Ok(Self::Grey(grey.ok_or_else(|| refused("unsupported strides".to_owned()))?));
         }
         // Arrays with another byte order have to be copied first.
         let native = || array.call_method1("astype", (kind.call_method1("newbyteorder", ("=",))?,));
@@ -101,25 +98,22 @@ impl<'py> Picture<'py> {
         if rows(&pixels.as_array()).is_some() {
             return Ok(borrowed(pixels));
         }
-        let view = pixels.as_array();
-        let (height, width) = view.dim();
-        Ok(copied(Gray::from_fn(width, height, |x, y| view[[y, x]])))
+        Ok(copied(copy_of(&pixels.as_array())))
     }
 
     /// Rejects NaN and floats outside 0 to 1, such as images scaled to 255.
     fn check_range(&self) -> Result<(), String> {
-        fn check(mut pixels: impl Iterator<Item = f32>) -> Result<(), String> {
-            pixels.find(|value| !(0.0..=1.0).contains(value)).map_or(Ok(()), |value| {
-                Err(format!(
-                    "float images range from 0 (black) to 1 (white), but this one contains {value}"
-                ))
-            })
-        }
-        match self {
-            Self::F32(pixels) => check(pixels.as_array().iter().copied()),
-            Self::Float(pixels) => check(pixels.pixels().iter().copied()),
-            _ => Ok(()),
-        }
+        let Some(ImageView::F32(image)) = self.view() else { return Ok(()) };
+        let is_valid = |value: &f32| (*value >= 0.0) & (*value <= 1.0);
+        let mut rows = (0..image.height()).map(|y| image.row(y));
+        // Without a branch per value, which would prevent vector instructions.
+        let wrong = rows.find(|row| !row.iter().fold(true, |all, value| all & is_valid(value)));
+        let value = wrong.and_then(|row| row.iter().find(|value| !is_valid(value)));
+        value.map_or(Ok(()), |value| {
+            Err(format!(
+                "float images range from 0 (black) to 1 (white), but this one contains {value}"
+            ))
+        })
     }
 
     /// Returns the view that detectors take.
@@ -143,26 +137,54 @@ impl<'py> Picture<'py> {
     }
 }
 
-/// Returns the colours as contiguous bytes.
-fn bytes_of(colours: ArrayView3<'_, u8>) -> Vec<u8> {
-    let bytes = Cow::from(colours.as_slice().unwrap_or_default());
-    if bytes.is_empty() { colours.iter().copied().collect() } else { bytes.into_owned() }
+/// Width of the blocks of a copy, px: in a transposed array, as many rows share the same cache lines.
+const BLOCK_PX: usize = 64;
+
+/// Returns a copy with contiguous rows.
+fn copy_of<T: Intensity>(pixels: &ArrayView2<'_, T>) -> Gray<T> {
+    let (height, width) = pixels.dim();
+    let mut copy = Gray::new(width, height);
+    let mut all = ArrayViewMut2::from_shape((height, width), copy.pixels_mut())
+        .expect("the image has the size of the array");
+    let blocks = all.axis_chunks_iter_mut(Axis(1), BLOCK_PX);
+    for (mut block, pixels) in blocks.zip(pixels.axis_chunks_iter(Axis(1), BLOCK_PX)) {
+        block.assign(&pixels);
+    }
+    copy
+}
+
+/// Returns the grey values of colours.
+fn grey_of(colours: &ArrayView3<'_, u8>) -> Option<Gray<u8>> {
+    let ((height, width, _), (first, bytes)) = (colours.dim(), memory(colours)?);
+    let strides = colours.strides().try_into().ok()?;
+    Some(Colours::with_strides(width, height, first, strides, bytes)?.grey())
 }
 
 /// Returns the array as rows of pixels if its memory layout allows: contiguous rows, from the top.
-#[allow(unsafe_code, reason = "ndarray has no slice of an array with gaps between its rows")]
 fn rows<'a, T: Intensity>(pixels: &ArrayView2<'a, T>) -> Option<View<'a, T>> {
     let (height, width) = pixels.dim();
-    let [down, across] = [pixels.strides()[0], pixels.strides()[1]];
+    let [down, across] = pixels.strides().try_into().ok()?;
     // The stride of an axis with one element is meaningless.
     let stride = if height == 1 { width } else { usize::try_from(down).ok()? };
-    if stride < width || (width > 1 && across != 1) {
+    if width > 1 && across != 1 {
         return None;
     }
-    let count = (height - 1).checked_mul(stride)?.checked_add(width)?;
-    // SAFETY: the array has at least one pixel. Its first pixel is at `as_ptr`, and its last one `count - 1` pixels later
-    // in the same allocation. The gaps between rows belong to that allocation too, and contain plain numbers. The array is
-    // borrowed for as long as the slice.
-    let all = unsafe { std::slice::from_raw_parts(pixels.as_ptr(), count) };
-    View::new(width, height, stride, all)
+    View::new(width, height, stride, memory(pixels)?.1)
+}
+
+/// Returns the memory from the lowest to the highest element of an array that is not empty, and the index of its first
+/// element there.
+#[allow(unsafe_code, reason = "ndarray has no slice of an array with gaps between its elements")]
+fn memory<'a, T, D: Dimension>(array: &ArrayView<'a, T, D>) -> Option<(usize, &'a [T])> {
+    let (mut before, mut after) = (0usize, 0usize);
+    for (&count, &stride) in array.shape().iter().zip(array.strides()) {
+        let reach = stride.unsigned_abs().checked_mul(count.checked_sub(1)?)?;
+        let side = if stride < 0 { &mut before } else { &mut after };
+        *side = side.checked_add(reach)?;
+    }
+    let count = before.checked_add(after)?.checked_add(1)?;
+    // SAFETY: the array is not empty, and its first element is at `as_ptr`. The lowest one is `before` elements earlier,
+    // and the highest one `after` elements later, in the same allocation. The gaps between elements belong to that
+    // allocation too, and contain plain numbers. The array is borrowed for as long as the slice.
+    Some((before, unsafe { std::slice::from_raw_parts(array.as_ptr().sub(before), count) }))
 }

@@ -3,7 +3,7 @@
 use deltille_core::detection::{Detection, InkEstimate, Watch};
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
-use deltille_core::raster::{AnyGray, FileNotes, Gray, grey_of_colours};
+use deltille_core::raster::{AnyGray, Colours, FileNotes, Gray};
 use deltille_core::targets::Target;
 use deltille_detect::{Detector, DetectorConfig, Tracker};
 use deltille_files::export::{csv, detection, orpc};
@@ -51,7 +51,8 @@ impl Picture {
     /// # Errors
     /// Throws if the number of bytes does not match width and height.
     pub fn of_colours(width: u32, height: u32, rgba: &[u8]) -> Result<Self, JsError> {
-        let grey = grey_of_colours::<4>(width, height, rgba).ok_or_else(wrong_size)?;
+        let colours = Colours::new(width as usize, height as usize, 4, rgba);
+        let grey = colours.ok_or_else(wrong_size)?.grey();
         Ok(Self { image: AnyGray::U8(grey), notes: FileNotes::default() })
     }
 }

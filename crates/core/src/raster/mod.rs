@@ -1,7 +1,7 @@
 //! Grey images: pixel types, views, pyramids, blur and exact area coverage.
 //!
 //! 1. `intensity`: pixel types; `gray`: an image of one type, `any_gray`: of 8 or 16 bits, as in files;
-//! 2. `view`: borrowed pixels, `image_view`: of any type; `luma`: grey values of colours; `mosaic`: those that a colour
+//! 2. `view`: borrowed pixels, `image_view`: of any type; `colours`: their grey values; `mosaic`: those that a colour
 //!    sensor measured;
 //! 3. `pyramid`: smaller copies; `blur`; `bands`: parallel processing of rows;
 //! 4. `coverage`: the exact area of outlines in every pixel.
@@ -11,11 +11,11 @@
 mod any_gray;
 mod bands;
 mod blur;
+mod colours;
 mod coverage;
 mod gray;
 mod image_view;
 mod intensity;
-mod luma;
 mod mosaic;
 mod pyramid;
 mod view;
@@ -23,13 +23,12 @@ mod view;
 pub use any_gray::{AnyGray, FileNotes};
 pub use bands::{bands, fill_bands};
 pub use blur::gaussian;
+pub use colours::Colours;
 pub use coverage::Coverage;
 pub use gray::Gray;
 pub use image_view::ImageView;
 #[doc(hidden)]
 pub use image_view::of_any;
 pub use intensity::{Intensity, PYRAMID_FULL_SCALE};
-pub use luma::grey_of_colours;
-pub use mosaic::measured;
 pub use pyramid::Pyramid;
 pub use view::View;

@@ -9,7 +9,7 @@
 //!   since: neither denoising, sharpening, a colour matrix nor compression, and
 //! - green has less noise where it was not measured, so it is interpolated.
 
-use super::{Gray, Intensity};
+use super::{Colours, Gray, Intensity};
 
 /// Side of the squares in which noise is observed, px: even, as the mosaic repeats after two pixels, and small, so that
 /// many show no edge.
@@ -42,32 +42,6 @@ const LEVEL_PX: usize = 16;
 /// Difference of a ratio from 1 below which a camera has balanced the planes, so that all are clipped at the same light.
 const BALANCED: f32 = 0.03;
 
-/// Returns the values that a Bayer sensor measured, at the level of green; `None` if the colours are not those of such a
-/// sensor, or do not contain its measured values any more. Each pixel has `N` values; the first three are red, green
-/// and blue. Returns `None` also if the number of values does not match the width and height.
-///
-/// ```
-/// use deltille_core::raster::measured;
-///
-/// assert_eq!(measured::<u8, 3>(2, 1, &[0; 6]), None);
-/// ```
-pub fn measured<T, const N: usize>(width: usize, height: usize, colours: &[T]) -> Option<Gray<T>>
-where
-    T: Intensity + TryFrom<u32> + Ord,
-{
-    let (pixels, rest) = colours.as_chunks::<N>();
-    let is_whole = N >= 3 && rest.is_empty() && width.checked_mul(height) == Some(pixels.len());
-    let planes = is_whole.then_some(Planes { width, height, pixels })?;
-    let squares = planes.flat_squares();
-    let most = |red: [usize; 2]| {
-        let found = planes.correlations(&squares, |x, y| channel(red, x, y))?;
-        Some((found.into_iter().fold(0.0, |most: f32, of| most.max(of.abs())), red))
-    };
-    let positions = [[0, 0], [1, 0], [0, 1], [1, 1]].into_iter().filter_map(most);
-    let (rest, red) = positions.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    (rest < WHITE && planes.contrast(&squares, red) > INTERPOLATED).then(|| planes.levelled(red))
-}
-
 /// Returns which colour is measured at a pixel of a mosaic whose first red pixel is `red`.
 fn channel(red: [usize; 2], x: usize, y: usize) -> usize {
     match [x % 2 == red[0], y % 2 == red[1]] {
@@ -85,15 +59,24 @@ fn arm(i: usize) -> f32 {
 /// Sum of the squares of [`arm`] over a square: side² (side² − 1)/12.
 const ARMS: f32 = (SQUARE_PX * SQUARE_PX * (SQUARE_PX * SQUARE_PX - 1)) as f32 / 12.0;
 
-struct Planes<'a, T, const N: usize> {
-    width: usize,
-    height: usize,
-    pixels: &'a [[T; N]],
-}
-
-impl<T: Intensity + TryFrom<u32> + Ord, const N: usize> Planes<'_, T, N> {
-    fn at(&self, x: usize, y: usize) -> &[T; N] {
-        &self.pixels[y * self.width + x]
+impl<T: Intensity + TryFrom<u32> + Ord> Colours<'_, T> {
+    /// Returns the values that a Bayer sensor measured, at the level of green; `None` if the colours are not those of
+    /// such a sensor, or do not contain its measured values any more.
+    ///
+    /// ```
+    /// use deltille_core::raster::Colours;
+    ///
+    /// assert_eq!(Colours::new(2, 1, 3, &[0u8; 6]).unwrap().measured(), None);
+    /// ```
+    pub fn measured(&self) -> Option<Gray<T>> {
+        let squares = self.flat_squares();
+        let most = |red: [usize; 2]| {
+            let found = self.correlations(&squares, |x, y| channel(red, x, y))?;
+            Some((found.into_iter().fold(0.0, |most: f32, of| most.max(of.abs())), red))
+        };
+        let positions = [[0, 0], [1, 0], [0, 1], [1, 1]].into_iter().filter_map(most);
+        let (rest, red) = positions.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        (rest < WHITE && self.contrast(&squares, red) > INTERPOLATED).then(|| self.levelled(red))
     }
 
     /// Returns the first pixels, even in both coordinates, of squares that show little but noise.
@@ -124,7 +107,7 @@ impl<T: Intensity + TryFrom<u32> + Ord, const N: usize> Planes<'_, T, N> {
             for (u, value) in row.iter_mut().enumerate() {
                 let (x, y) = (first[0] + u, first[1] + v);
                 let of = channel(x, y);
-                *value = self.at(x, y)[of].to_f32();
+                *value = self.at(x, y, of).to_f32();
                 if *value <= 0.0 || *value >= T::FULL_SCALE {
                     return None;
                 }
@@ -216,9 +199,10 @@ impl<T: Intensity + TryFrom<u32> + Ord, const N: usize> Planes<'_, T, N> {
             (first, (first + 1).min(count - 1), at - first as f32)
         };
         Gray::from_fn(self.width, self.height, |x, y| {
-            let (colours, of) = (self.at(x, y), channel(red, x, y));
+            let of = channel(red, x, y);
+            let (measured, green) = (self.at(x, y, of), self.at(x, y, 1));
             if of == 1 {
-                return colours[1];
+                return green;
             }
             let ((left, right, by), (top, bottom, down_by)) =
                 (between(x, across), between(y, down));
@@ -228,10 +212,10 @@ impl<T: Intensity + TryFrom<u32> + Ord, const N: usize> Planes<'_, T, N> {
             };
             let ratio = row(top) + down_by * (row(bottom) - row(top));
             let ratio = if (ratio - 1.0).abs() < BALANCED { 1.0 } else { ratio };
-            let mut value = ratio * colours[of].to_f32();
-            if colours[of].to_f32() >= T::FULL_SCALE {
+            let mut value = ratio * measured.to_f32();
+            if measured.to_f32() >= T::FULL_SCALE {
                 // Darker light than green can show, and no more is known.
-                value = value.max(colours[1].to_f32());
+                value = value.max(green.to_f32());
             }
             T::try_from((value + 0.5) as u32).map_or(white, |value| value.min(white))
         })
@@ -246,12 +230,11 @@ impl<T: Intensity + TryFrom<u32> + Ord, const N: usize> Planes<'_, T, N> {
     fn levels(&self) -> Vec<[f32; 3]> {
         let [across, down] = self.in_levels();
         let mut sums = vec![[0.0f32; 3]; across * down];
-        for (i, pixel) in self.pixels.iter().enumerate() {
-            let [x, y] = [i % self.width, i / self.width].map(|c| c / LEVEL_PX);
-            let sums = &mut sums[y * across + x];
-            for of in 0..3 {
-                let value = pixel[of].to_f32();
-                sums[of] += if value < T::FULL_SCALE { value } else { f32::NAN };
+        for (y, x) in (0..self.height).flat_map(|y| (0..self.width).map(move |x| (y, x))) {
+            let sums = &mut sums[y / LEVEL_PX * across + x / LEVEL_PX];
+            for (of, sum) in sums.iter_mut().enumerate() {
+                let value = self.at(x, y, of).to_f32();
+                *sum += if value < T::FULL_SCALE { value } else { f32::NAN };
             }
         }
         let total = |of: &mut dyn Iterator<Item = usize>| {
@@ -274,6 +257,10 @@ mod tests {
     use super::*;
 
     const SIDE: usize = 128;
+
+    fn measured(colours: &[u8]) -> Option<Gray<u8>> {
+        Colours::new(SIDE, SIDE, 3, colours)?.measured()
+    }
 
     /// Noise of a standard deviation of about 4 levels, without a repeating pattern.
     fn noise(i: usize) -> f32 {
@@ -318,7 +305,7 @@ mod tests {
     fn measured_values_are_found_at_any_position_of_the_mosaic() {
         for red in [[0, 0], [1, 0], [0, 1], [1, 1]] {
             let (raw, colours) = sensor(red, [1.0; 3]);
-            let found = measured::<u8, 3>(SIDE, SIDE, &colours).unwrap();
+            let found = measured(&colours).unwrap();
             let far = raw.iter().zip(found.pixels()).filter(|(a, b)| a.abs_diff(**b) > 2).count();
             assert_eq!(far, 0, "{red:?}");
         }
@@ -328,7 +315,7 @@ mod tests {
     fn planes_of_other_levels_are_brought_to_that_of_green() {
         let (plain, _) = sensor([1, 0], [1.0; 3]);
         let (_, colours) = sensor([1, 0], [0.5, 1.0, 0.7]);
-        let found = measured::<u8, 3>(SIDE, SIDE, &colours).unwrap();
+        let found = measured(&colours).unwrap();
         let far = plain.iter().zip(found.pixels()).filter(|(a, b)| a.abs_diff(**b) > 4).count();
         assert!(far < SIDE, "{far}");
     }
@@ -336,7 +323,7 @@ mod tests {
     #[test]
     fn other_colours_are_left_alone() {
         let (_, colours) = sensor([0, 0], [1.0; 3]);
-        let is_left = |colours: Vec<u8>| measured::<u8, 3>(SIDE, SIDE, &colours).is_none();
+        let is_left = |colours: Vec<u8>| measured(&colours).is_none();
         // Three planes measured at every pixel, and a grey image.
         let independent = (0..3 * SIDE * SIDE).map(|i| (128.0 + noise(i)) as u8).collect();
         assert!(is_left(independent));
