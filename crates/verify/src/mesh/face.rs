@@ -7,10 +7,11 @@ use glam::{DVec2, DVec3};
 use crate::finding::any::Finding;
 use crate::finding::board::BoardFinding;
 use crate::finding::mesh::MeshFinding;
-use crate::mesh::face_view::{GRAZING_TOLERANCE_MM, MAX_TEXEL_PX, view};
+use crate::mesh::face_view::{GRAZING_TOLERANCE_MM, MAX_SIDE_PX, MAX_TEXEL_PX, view, windows};
 use crate::mesh::measures::MESH_TOLERANCE_MM;
 use crate::mesh::print::check_print;
 use crate::model::mesh::Model;
+use crate::model::view::View;
 use crate::panel::alone::{MATCH_EDGES, detect_alone, outline_alone};
 use crate::verdict::FaceVerdict;
 use crate::verifier::Verifier;
@@ -26,18 +27,7 @@ const LOCATED_PX: f64 = 0.04;
 const LOCATED_TEXELS: f64 = 0.15;
 
 pub(super) fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> FaceVerdict {
-    let (view, px_per_mm) = view(verifier, model, panel);
-    let image = view.render(model);
-    let detection = match panel.tags.is_empty() {
-        true => {
-            let outline = outline_alone(panel).into_iter().filter_map(|place| {
-                let seen = view.camera_from_target.apply(panel.pose.target_from_panel(place));
-                view.camera.project(seen)
-            });
-            detect_alone(panel, image.clone(), u8::MAX, &outline.collect::<Vec<_>>())
-        }
-        false => verifier.detector.detect(&image, "face"),
-    };
+    let (whole, px_per_mm) = view(verifier, model, panel);
     let mut verdict = FaceVerdict {
         panel: panel.id,
         px_per_mm,
@@ -48,9 +38,19 @@ pub(super) fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> F
         max_deviation_mm: 0.0,
         findings: Vec::new(),
     };
-    let seen = seen_corners(verifier, panel, &detection, |pixel| view.meet(model, pixel));
+    let windows = windows(&whole, panel, px_per_mm);
+    let detections: Vec<Detection> =
+        windows.iter().map(|view| detect(verifier, panel, view, view.render(model))).collect();
+    let seen: Vec<Seen> = (windows.iter().zip(&detections))
+        .flat_map(|(view, found)| {
+            seen_corners(verifier, panel, found, |pixel| view.meet(model, pixel))
+        })
+        .collect();
     if !seen.iter().any(|seen| seen.panel.id == panel.id) {
-        let mirrored = sees(&verifier.detector.detect(&mirror(image), "mirror"), panel.id);
+        let is_mirrored = |view: &View| {
+            sees(&verifier.detector.detect(&mirror(view.render(model)), "mirror"), panel.id)
+        };
+        let mirrored = windows.iter().any(is_mirrored);
         let panel = panel.id;
         let finding = if mirrored {
             BoardFinding::Mirrored { panel }
@@ -67,11 +67,13 @@ pub(super) fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> F
         // All other deviations follow from this one.
         return verdict;
     }
-    check_print(verifier, model, panel, px_per_mm, &mut verdict);
+    let page_px_per_mm = px_per_mm.min(px_per_mm * MAX_SIDE_PX / f64::from(whole.camera.width));
+    check_print(verifier, model, panel, page_px_per_mm, &mut verdict);
     if !verdict.findings.is_empty() {
         return verdict;
     }
-    let own = || detection.grids.iter().filter(|grid| grid.panel == Some(panel.id));
+    let grids = || detections.iter().flat_map(|detection| &detection.grids);
+    let own = || grids().filter(|grid| grid.panel == Some(panel.id));
     // Tags at the rim without board corners at some of their vertices were compared cell by cell only.
     let is_read = |tag: &&TagPlacement| {
         panel.tag_tile(tag).vertices().all(|vertex| panel.corner_at(vertex).is_some())
@@ -81,7 +83,8 @@ pub(super) fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> F
         let same = |found: &&deltille_core::detection::DecodedTag| {
             (found.id, found.row, found.col) == (tag.id, tag.row, tag.col)
         };
-        let errors = own().flat_map(|grid| &grid.tags).find(same).map(|found| found.errors);
+        // Of windows, the one that shows most of the tag.
+        let errors = own().flat_map(|grid| &grid.tags).filter(same).map(|found| found.errors).min();
         if errors == Some(0) {
             verdict.tags_exact += 1;
         } else {
@@ -90,6 +93,18 @@ pub(super) fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> F
         }
     }
     verdict
+}
+
+/// Detects a face in an image of it.
+fn detect(verifier: &Verifier, panel: &Panel, view: &View, image: Gray<u8>) -> Detection {
+    if !panel.tags.is_empty() {
+        return verifier.detector.detect(&image, "face");
+    }
+    let outline = outline_alone(panel).into_iter().filter_map(|place| {
+        let seen = view.camera_from_target.apply(panel.pose.target_from_panel(place));
+        view.camera.project(seen)
+    });
+    detect_alone(panel, image, u8::MAX, &outline.collect::<Vec<_>>())
 }
 
 /// A corner seen in the image of a face.
@@ -118,10 +133,7 @@ fn seen_corners<'a>(
                 Some(panel) => panel
                     .corner_at(Vertex::new(corner.row, corner.col))
                     .filter(|stated| corner.id == Some(stated.id)),
-                None if panel.tags.is_empty() => panel
-                    .corners
-                    .iter()
-                    .find(|stated| stated.target_mm.distance(at_mm) < MATCH_EDGES * panel.edge_mm),
+                None if panel.tags.is_empty() => corner_near(panel, at_mm),
                 None => None,
             };
             let panel = labelled.unwrap_or(panel);
@@ -129,6 +141,13 @@ fn seen_corners<'a>(
         }
     }
     all
+}
+
+/// Returns the corner within [`MATCH_EDGES`] of a position, mm, which is NaN if a ray misses the mesh.
+fn corner_near(panel: &Panel, at_mm: DVec3) -> Option<&Corner> {
+    let at = panel.pose.panel_from_target(at_mm).truncate() / panel.edge_mm;
+    let mut near = panel.tile_at(at).vertices().filter_map(|vertex| panel.corner_at(vertex));
+    near.find(|stated| stated.target_mm.distance(at_mm) < MATCH_EDGES * panel.edge_mm)
 }
 
 /// Compares every corner with its stated position on the mesh. Neighbouring faces in the image must be at their

@@ -89,7 +89,7 @@ pub(super) fn face_page(
                 if weights.iter().all(|&w| w >= 0.0) {
                     let uv: DVec2 = (0..3).map(|i| triangle.uv[i] * weights[i]).sum();
                     let at = uv * size - DVec2::splat(0.5);
-                    shades[y * width + x] = texture.bilinear(at.x, at.y).round() as u8;
+                    shades[y * width + x] = (texture.bilinear(at.x, at.y) + 0.5) as u8;
                 }
             }
         }

@@ -54,6 +54,7 @@ pub(super) fn check_print(
         model,
         panel,
         pattern: &Pattern::new(panel, &expected),
+        cell_mm: looks.as_ref().map_or(f64::INFINITY, |looks| panel.edge_mm / looks.width),
         field: panel.field_outline_mm(),
         fills_face: panel.rim_mm.is_none(),
     };

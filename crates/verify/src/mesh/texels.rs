@@ -26,11 +26,17 @@ const MIN_AREA: f64 = 1e-6;
 /// Texels at a distance of exactly one are not shown: their weight is 0.
 const OPEN: f64 = 1e-6;
 
+/// Tolerance of positions on small tags, cells: a third of the distance from the middle of a triangular cell to its
+/// edges, so that a cell is not all edge.
+const MOVED_CELLS: f64 = 0.1;
+
 /// A face and its texture.
 pub(super) struct Texels<'a> {
     pub model: &'a Model,
     pub panel: &'a Panel,
     pub pattern: &'a Pattern<'a>,
+    /// Edge of a tag cell, mm; infinite without tags.
+    pub cell_mm: f64,
     /// Outline of the black field of an inverted panel, counter-clockwise, mm.
     pub field: Vec<DVec2>,
     /// Whether the field is the whole face, so that its outline is not a printed edge.
@@ -80,9 +86,9 @@ impl Texels<'_> {
     fn is_wrong(&self, light: u8, place: DVec2, texel_mm: f64, with_tiles: bool) -> bool {
         let ink = 1.0 - f64::from(light) / 255.0;
         let at = place / self.panel.edge_mm;
-        let inside = self.inside_mm(place);
-        let in_field = |inside: f64| !self.panel.inverted || inside >= 0.0;
-        let black = self.pattern.is_black_at(at) && in_field(inside);
+        let inside = if self.panel.inverted { self.inside_mm(place) } else { f64::INFINITY };
+        let colour = self.pattern.is_black_at(at);
+        let black = colour && inside >= 0.0;
         if (ink - f64::from(u8::from(black))).abs() <= MAX_INK_ERROR {
             return false;
         }
@@ -91,16 +97,18 @@ impl Texels<'_> {
         }
         // Around drawn edges: within the tolerance of positions, plus the smear of rendering.
         let smear_mm = EDGE_PX * texel_mm;
-        let near_mm = smear_mm + MESH_TOLERANCE_MM;
+        let near_mm = smear_mm + MESH_TOLERANCE_MM.min(MOVED_CELLS * self.cell_mm);
         let field_mm = if self.fills_face { smear_mm } else { near_mm };
-        if self.panel.inverted && inside.abs() <= field_mm {
+        if inside.abs() <= field_mm {
             return false;
         }
-        let colour = self.pattern.is_black_at(at);
         let mut probes = (0..PROBES).map(|n| f64::from(n) * TAU / f64::from(PROBES));
+        // A circle alone would miss cells narrower than it.
         !probes.any(|angle| {
-            let probe = near_mm / self.panel.edge_mm * DVec2::from_angle(angle);
-            self.pattern.is_black_at(at + probe) != colour
+            [smear_mm, near_mm].iter().any(|radius_mm| {
+                let probe = radius_mm / self.panel.edge_mm * DVec2::from_angle(angle);
+                self.pattern.is_black_at(at + probe) != colour
+            })
         })
     }
 

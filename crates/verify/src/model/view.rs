@@ -67,7 +67,7 @@ impl View {
                     nearest[at] = inverse_z as f32;
                     let sum: DVec2 = (0..3).map(|i| per_z[i] * triangle.uv[i]).sum();
                     let texel = sum / inverse_z * size - 0.5;
-                    shades[at] = texture.bilinear(texel.x, texel.y).round() as u8;
+                    shades[at] = (texture.bilinear(texel.x, texel.y) + 0.5) as u8;
                 }
             }
         }

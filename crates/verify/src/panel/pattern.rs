@@ -100,7 +100,8 @@ pub(crate) struct TagLooks {
     /// Distance from the edges of the tile to the border, and to the cells, bit widths.
     margin: f64,
     pub inset: f64,
-    width: f64,
+    /// Edge of the tile, bit widths.
+    pub width: f64,
     /// Radius of the hole in the centre of a triangle, edges.
     hole: Option<f64>,
     /// Bit of each cell, in rows of `columns` positions, two per column: inverted, upright.

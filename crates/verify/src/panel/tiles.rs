@@ -143,8 +143,10 @@ impl<'a> PlacedPanel<'a> {
                             inside(q) && black_at(q) == black
                         })
                 };
-                let is_wrong = error > most_at_edges && is_uniform(&around, 1)
-                    || error > MAX_INK_ERROR && is_uniform(&further, 1);
+                // A circle alone would miss cells narrower than it.
+                let is_wrong = error > MAX_INK_ERROR
+                    && is_uniform(&around, 1)
+                    && (error > most_at_edges || is_uniform(&further, 1));
                 // Most pixels are right, and those need no closer examination.
                 if !is_wrong && !is_uniform(&around, COARSE) {
                     continue;
