@@ -227,23 +227,43 @@ pub(crate) fn after(first: usize, count: usize) -> Vec<f64> {
 }
 
 /// The most significant change, if it is significant.
+///
+/// The standard deviation of a change needs a fit without each view in turn. It is at least that from noise, whose
+/// significance therefore bounds that of the change, and follows from sums over the views before and after it.
 fn step(equations: &StateEquations) -> Option<Step> {
     let count = equations.count();
-    let places = MIN_VIEWS..(count + 1).saturating_sub(MIN_VIEWS);
-    let tried = (places.len() * ChangedIntrinsic::ALL.len()) as f64;
-    let all = places.flat_map(|first| ChangedIntrinsic::ALL.map(|intrinsic| (intrinsic, first)));
-    let of = |(intrinsic, first): (ChangedIntrinsic, usize)| {
+    let tried = ((count + 1).saturating_sub(2 * MIN_VIEWS) * ChangedIntrinsic::ALL.len()) as f64;
+    let corrected = |effect: Effect| (tried * significance(effect)).min(1.0);
+    let mut all: Vec<(f64, usize, ChangedIntrinsic)> = Vec::new();
+    for intrinsic in ChangedIntrinsic::ALL {
+        let effects = equations.changes_from_noise(&base(equations), intrinsic.candidate());
+        for (first, effect) in effects.into_iter().enumerate() {
+            let is_place = first >= MIN_VIEWS && first + MIN_VIEWS <= count;
+            if let (true, Some(effect)) = (is_place, effect) {
+                all.push((corrected(effect), first, intrinsic));
+            }
+        }
+    }
+    // Of equally significant changes, the first is reported.
+    all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut best: Option<Step> = None;
+    for (bound, first, intrinsic) in all {
+        if bound >= best.as_ref().map_or(SIGNIFICANT, |best| best.significance) {
+            break;
+        }
         let mut columns = base(equations);
         columns.push(Step::column(intrinsic, first, equations));
-        let fit = equations.fit(&columns)?;
+        let Some(fit) = equations.fit(&columns) else { continue };
         // One degree of freedom for the mean of each group.
-        let effect = fit.effect(columns.len() - 1, 2.0)?;
-        let significance = (tried * significance(effect)).min(1.0);
-        Some(Step { intrinsic, first, effect, significance, fit })
-    };
-    let best = all.filter_map(of).min_by(|a, b| a.significance.total_cmp(&b.significance))?;
+        let Some(effect) = fit.effect(columns.len() - 1, 2.0) else { continue };
+        let significance = corrected(effect);
+        if best.as_ref().is_none_or(|best| significance < best.significance) {
+            best = Some(Step { intrinsic, first, effect, significance, fit });
+        }
+    }
+    let best = best.filter(|best| best.significance < SIGNIFICANT)?;
     let smooth = smooth(best.intrinsic, equations)?;
-    (best.significance < SIGNIFICANT && best.fit.left < smooth.left).then_some(best)
+    (best.fit.left < smooth.left).then_some(best)
 }
 
 /// The fit of an intrinsic that drifts from the first view to the last, and follows the tilt and the distance of the

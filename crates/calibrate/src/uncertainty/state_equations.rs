@@ -245,6 +245,43 @@ impl StateEquations {
         Some(Fit { beta, inverse, parts, whole, right, left, freedom })
     }
 
+    /// For each view k, the effect of a candidate on the views from k on, beside columns without weights, with the
+    /// standard deviation from noise and the most degrees of freedom that [`Fit::effect`] finds; `None` if it is not
+    /// distinguishable from the columns.
+    pub(crate) fn changes_from_noise(
+        &self,
+        columns: &[Column],
+        candidate: Candidate,
+    ) -> Vec<Option<Effect>> {
+        let m = columns.len();
+        let chosen = || columns.iter().map(|column| Column { index: column.index, weights: None });
+        let columns: Vec<Column> = chosen().chain([self.column(candidate)]).collect();
+        // Of the columns, the candidate and the residual.
+        let all = (0..self.count()).map(|view| self.chosen(view, &columns, &[]));
+        let all = all.fold(DMatrix::zeros(m + 2, m + 2), |sum, gram| sum + gram);
+        let freedom = self.views.iter().map(|view| view.freedom).sum::<f64>() - (m + 1) as f64;
+        let mut after = all.clone();
+        let from = |view: usize| {
+            if view > 0 {
+                after -= self.chosen(view - 1, &columns, &[]);
+            }
+            let mut whole = all.view((0, 0), (m + 1, m + 1)).into_owned();
+            let mut right = all.view((0, m + 1), (m + 1, 1)).column(0).into_owned();
+            for i in 0..=m {
+                (whole[(i, m)], whole[(m, i)]) = (after[(i, m)], after[(m, i)]);
+            }
+            right[m] = after[(m, m + 1)];
+            let inverse = inverted(&whole)?;
+            let beta = &inverse * &right;
+            let left = (all[(m + 1, m + 1)] - beta.dot(&right)).max(0.0);
+            let variance = inverse[(m, m)] * left / freedom.max(1.0);
+            let (value, sd) = (beta[m], variance.sqrt());
+            let freedom = 2.0 * self.count() as f64;
+            sd.is_finite().then_some(Effect { value, sd, freedom })
+        };
+        (0..self.count()).map(from).collect()
+    }
+
     /// For each view of a fit by [`Self::fit_with_each`], the values of the candidates and the
     /// reduction of the view's sum of squares.
     pub(crate) fn each(
@@ -487,3 +524,51 @@ fn inverted(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 
 /// Term added to a diagonal of 1, so that directions with less information remain unchanged.
 const SINGULAR: f64 = 1e-11;
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    /// Views of random rows for two camera parameters.
+    fn equations(views: usize) -> StateEquations {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let n = 2 + CANDIDATES + 1;
+        let view = |frame: usize| {
+            let rows = DMatrix::from_fn(30, n, |_, _| random.random_range(-1.0..1.0));
+            ViewEquations {
+                frame,
+                gram: rows.tr_mul(&rows),
+                freedom: 24.0,
+                px: 1.0,
+                px_per_mm: 1.0,
+                obliquity: 0.0,
+                log_distance: 0.0,
+            }
+        };
+        let views = (0..views).map(view).collect();
+        StateEquations { views, free: vec![0, 1], is_of_one_panel: true }
+    }
+
+    /// Sums over the views before and after a change give the same as a fit of it, and its standard deviation from the
+    /// scatter of views is not smaller.
+    #[test]
+    fn changes_from_noise_equal_those_of_fits() {
+        let equations = equations(12);
+        let candidate = Candidate::CentreX;
+        let found = equations.changes_from_noise(&equations.camera(), candidate);
+        for (first, found) in found.into_iter().enumerate().skip(1) {
+            let after = (0..12).map(|view| f64::from(u8::from(view >= first))).collect();
+            let mut columns = equations.camera();
+            columns.push(equations.weighted(candidate, after));
+            let fit = equations.fit(&columns).unwrap();
+            let (found, whole) = (found.unwrap(), fit.effect(2, 2.0).unwrap());
+            assert!((found.value - whole.value).abs() < 1e-9 * found.sd, "change at {first}");
+            let sd = fit.noise_variance(2).sqrt();
+            assert!((found.sd - sd).abs() < 1e-9 * sd, "change at {first}");
+            assert!(whole.sd >= sd && whole.freedom < found.freedom, "change at {first}");
+        }
+    }
+}
