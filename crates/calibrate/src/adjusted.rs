@@ -50,13 +50,13 @@ impl Calibration {
             true => own.bent(&gross, settled)?,
             false => (settled, 0.0),
         };
-        let settled = match own.measure_target {
+        let (settled, found) = match own.measure_target {
             true => own.measured(&gross, settled)?,
-            false => settled,
+            false => (settled, None),
         };
         findings.extend(gross.findings(&settled, |frame| frames[frame].name.clone()));
         let kept: Vec<&Frame> = gross.belonging().map(|frame| &frames[frame]).collect();
-        let mut estimate = Estimate::new(&own, &kept, &settled, f_ratio)?;
+        let mut estimate = Estimate::new(&own, &kept, &settled, found, f_ratio)?;
         let of_cameras = estimate.cameras.iter_mut().zip(delays);
         for ((camera, delay), rotation) in of_cameras.zip(rotations) {
             (camera.delay, camera.label_rotation) = (delay, rotation);

@@ -2,6 +2,7 @@
 
 use super::reweighting::{Kept, Settled, settle, variance};
 use super::wrong_views::Gross;
+use crate::equations::covariances::Covariances;
 use crate::equations::minimise::{Minimum, Until, minimise};
 use crate::error::CalibrationError;
 use crate::input::calibration::Calibration;
@@ -76,15 +77,14 @@ impl Calibration {
         Ok((settled, f_ratio))
     }
 
-    /// Also estimates the position of every corner of the target.
+    /// Also estimates the position of every corner of the target; returns the covariances too if they are known.
     pub(crate) fn measured(
         &self,
         gross: &Gross,
         settled: Settled,
-    ) -> Result<Settled, CalibrationError> {
-        let mut problem = settled.problem.clone();
-        let map = CornerMap::flat(&problem.blocks);
-        problem.map = Some(map);
+    ) -> Result<(Settled, Option<Covariances>), CalibrationError> {
+        let mut problem = settled.problem;
+        problem.map = Some(CornerMap::flat(&problem.blocks));
         let mut settled = settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)?;
         for _ in 0..PRIOR_ROUNDS {
             let Minimum { problem, normal, layout, .. } = &settled.minimum;
@@ -93,12 +93,14 @@ impl Calibration {
             let (prior_mm, determined) = map.fitted_prior(&found.corners, settled.whitening.sigma);
             let change = (prior_mm - map.prior_mm).abs() / map.prior_mm;
             if change.max_element() < SAME_PRIOR {
-                break;
+                return Ok((settled, Some(found)));
             }
-            let mut problem = settled.problem.clone();
-            problem.map = Some(map.clone().expecting(prior_mm, determined));
-            settled = settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)?;
+            let map = map.clone().expecting(prior_mm, determined);
+            // The equations and the covariances, which may be large, end here.
+            let Settled { minimum: Minimum { factor, .. }, mut problem, .. } = settled;
+            problem.map = Some(map);
+            settled = settle(Kept { problem, factor, ..gross.kept() }, self.weights, self.loss)?;
         }
-        Ok(settled)
+        Ok((settled, None))
     }
 }

@@ -8,7 +8,8 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use crate::equations::minimise::{Minimum, Until, minimise};
+use crate::equations::minimise::{Minimum, Until, minimise_with};
+use crate::equations::normal::Factor;
 use crate::error::CalibrationError;
 use crate::input::loss::Loss;
 use crate::input::observation::{MIN_CORNERS, Observation};
@@ -54,6 +55,8 @@ pub(crate) struct Kept {
     /// in the first round: if two fifths of the corners are displaced together, they bias the
     /// estimate so much that they no longer stand out.
     pub some_stand_out: bool,
+    /// The factor of similar equations.
+    pub factor: Option<Factor>,
 }
 
 /// A consistent solution for the weights, the set of inliers, and the unknowns.
@@ -79,7 +82,7 @@ pub(super) fn settle(
     weights: Weights,
     loss: Loss,
 ) -> Result<Settled, CalibrationError> {
-    let Kept { problem, left_out, some_stand_out } = kept;
+    let Kept { problem, left_out, some_stand_out, mut factor } = kept;
     let start = || CalibrationError::NoStart;
     let all_of = |keep: bool| move |block: &Block| vec![keep; block.observations.len()];
     let none: Vec<Vec<bool>> = problem.blocks.iter().map(all_of(false)).collect();
@@ -104,7 +107,8 @@ pub(super) fn settle(
         false => 0,
     };
     for round in 1..rounds {
-        part = minimise(part, &whitening, loss, Until::Rough).ok_or_else(start)?.problem;
+        let minimum = minimise_with(factor, part, &whitening, loss, Until::Rough);
+        Minimum { problem: part, factor, .. } = minimum.ok_or_else(start)?;
         all = all.at(&part);
         whitening = Whitening::fit(&part, weights, &residuals(&part));
         let now = match loss {
@@ -121,7 +125,7 @@ pub(super) fn settle(
             break;
         }
     }
-    let minimum = minimise(part, &whitening, loss, Until::Fine).ok_or_else(start)?;
+    let minimum = minimise_with(factor, part, &whitening, loss, Until::Fine).ok_or_else(start)?;
     let problem = all.at(&minimum.problem);
     let limit = whitening.outlier_limit();
     let of_block = |off: Vec<f64>| off.into_iter().map(|off| off > limit).collect();

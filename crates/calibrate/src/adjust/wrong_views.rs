@@ -261,7 +261,7 @@ impl Gross {
         let of_blocks = self.problem.blocks.iter().zip(&self.left_out);
         let left_out = of_blocks.filter(|(block, _)| belongs(block.frame)).map(|(_, out)| *out);
         let (problem, left_out) = (self.problem.with_frames(belongs), left_out.collect());
-        Kept { problem, left_out, some_stand_out: self.some_stand_out }
+        Kept { problem, left_out, some_stand_out: self.some_stand_out, factor: None }
     }
 
     /// Findings: what the outliers have in common. `names` gives the name of a frame by its index

@@ -4,7 +4,8 @@
 //! memory once for each column. With blocks, nearly all work consists of matrix products, which
 //! read it once for each block.
 
-use nalgebra::{Cholesky, DMatrix, Dyn};
+use nalgebra::{Cholesky, DMatrix, DMatrixViewMut, Dyn};
+use rayon::prelude::*;
 
 /// Number of columns of a block.
 const WIDTH: usize = 64;
@@ -64,10 +65,16 @@ pub(super) fn subtract_product(
     right: &DMatrix<f64>,
 ) {
     let n = matrix.nrows();
-    for (first, count) in blocks(n) {
-        let mut own = matrix.view_mut((first, first), (n - first, count));
-        own.gemm(-1.0, &left.rows(first, n - first), &right.columns(first, count), 1.0);
+    if n == 0 {
+        return;
     }
+    let some = matrix.as_mut_slice().par_chunks_mut(n * WIDTH).enumerate();
+    some.for_each(|(index, some)| {
+        let (first, count) = (index * WIDTH, some.len() / n);
+        let mut own = DMatrixViewMut::from_slice(some, n, count);
+        let mut own = own.rows_mut(first, n - first);
+        own.gemm(-1.0, &left.rows(first, n - first), &right.columns(first, count), 1.0);
+    });
 }
 
 /// Copies the blocks of a symmetric matrix from below its diagonal to above it.

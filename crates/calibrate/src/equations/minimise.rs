@@ -1,7 +1,7 @@
 //! Levenberg–Marquardt: iterates from the values of a problem to the next minimum of the cost.
 
 use super::layout::Layout;
-use super::normal::Normal;
+use super::normal::{Factor, Normal};
 use crate::input::loss::Loss;
 use crate::problem::bundle::Problem;
 use crate::problem::whitening::Whitening;
@@ -45,6 +45,8 @@ pub(crate) struct Minimum {
     pub normal: Normal,
     pub layout: Layout,
     pub steps: usize,
+    /// The last factor of the equations, if they are large.
+    pub factor: Option<Factor>,
 }
 
 /// Iterates from the problem's values to the next minimum of the cost (Levenberg–Marquardt); `None` if a camera cannot
@@ -55,16 +57,27 @@ pub(crate) fn minimise(
     loss: Loss,
     until: Until,
 ) -> Option<Minimum> {
+    minimise_with(None, problem, whitening, loss, until)
+}
+
+/// The same with the factor of similar equations.
+pub(crate) fn minimise_with(
+    factor: Option<Factor>,
+    problem: Problem,
+    whitening: &Whitening,
+    loss: Loss,
+    until: Until,
+) -> Option<Minimum> {
     let layout = Layout::of(&problem);
     let normal = Normal::of(&problem, &layout, whitening, loss)?;
-    let mut best = Minimum { problem, normal, layout, steps: 0 };
+    let mut best = Minimum { problem, normal, layout, steps: 0, factor };
     let mut damping = Damping::from(DAMPING);
     let coordinates = 2.0 * best.problem.count() as f64;
     while best.steps < MAX_STEPS && damping.part() < MAX_DAMPING {
         if best.problem.stop.is_raised() {
             return None;
         }
-        let Some(step) = best.normal.step(&best.layout, damping) else {
+        let Some(step) = best.normal.step(&best.layout, damping, &mut best.factor) else {
             damping.stiffen();
             continue;
         };
@@ -73,13 +86,19 @@ pub(crate) fn minimise(
             break;
         }
         let problem = best.problem.after(&best.layout, &step);
+        best.normal.release_if_large();
         match Normal::of(&problem, &best.layout, whitening, loss) {
             Some(normal) if normal.cost < best.normal.cost => {
                 (best.problem, best.normal) = (problem, normal);
                 best.steps += 1;
                 damping.ease();
             }
-            _ => damping.stiffen(),
+            _ => {
+                damping.stiffen();
+                if best.normal.is_released() {
+                    best.normal = Normal::of(&best.problem, &best.layout, whitening, loss)?;
+                }
+            }
         }
     }
     Some(best)

@@ -33,7 +33,8 @@ use crate::uncertainty::state_equations::StateEquations;
 use deltille_core::camera::PROJECTION_PARAMETERS;
 
 impl Estimate {
-    /// Assembles the estimate; `frames` are those of the settled problem, and `f_ratio` is that of the shape.
+    /// Assembles the estimate; `frames` are those of the settled problem, `found` are its covariances if they are
+    /// known, and `f_ratio` is that of the shape.
     ///
     /// # Errors
     /// Returns an error if the views do not determine the pose of a frame, a camera or a panel.
@@ -41,14 +42,16 @@ impl Estimate {
         calibration: &Calibration,
         frames: &[&Frame],
         settled: &Settled,
+        found: Option<Covariances>,
         f_ratio: f64,
     ) -> Result<Self, CalibrationError> {
         let Calibration { cameras, loss, distances_mm, board_accuracy_mm, .. } = calibration;
         let loss = *loss;
         let Settled { minimum, whitening, .. } = settled;
-        let Minimum { problem, normal, layout, steps } = minimum;
+        let Minimum { problem, normal, layout, steps, .. } = minimum;
         let open = |parameters: String| CalibrationError::Undetermined { parameters };
-        let found = normal.covariances(layout).ok_or_else(|| open("the poses".to_owned()))?;
+        let found = found.or_else(|| normal.covariances(layout));
+        let found = found.ok_or_else(|| open("the poses".to_owned()))?;
         let poses = open_poses(calibration, minimum, &found);
         if !poses.is_empty() {
             return Err(open(poses.join(", ")));
