@@ -1,6 +1,6 @@
 //! Input options of the calibration commands: the target and its detections.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail, ensure};
@@ -287,7 +287,7 @@ pub fn read(
     limits: &Limits,
     is_assumed: bool,
 ) -> anyhow::Result<Read> {
-    let (mut files, mut detections, mut foreign) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut different, mut foreign) = (Different::default(), Vec::new());
     let mut copies = Vec::new();
     let Places { texts, tables } = places(paths)?;
     for Place { path, is_named } in texts {
@@ -305,21 +305,22 @@ pub fn read(
         }
         let found: Detection = detection::read(&text).with_context(show)?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        copies.extend(add(&mut detections, &mut files, (name, found), path));
+        copies.extend(different.add((name, found), path));
     }
     for Tables { files: of_table, folder } in tables {
         // The tables repeat the JSON detections in the same folder, which would then count twice.
-        if let Some(one) =
-            folder.and_then(|folder| files.iter().find(|file| file.parent() == Some(&folder)))
+        if let Some(one) = folder
+            .and_then(|folder| different.files.iter().find(|file| file.parent() == Some(&folder)))
         {
             log!("excluded: {}: {} contains the same data", of_table[0].display(), one.display());
             continue;
         }
         for (name, found) in of_tables(&of_table, limits)? {
             let path = of_table[0].with_file_name(&found.image);
-            copies.extend(add(&mut detections, &mut files, (name, found), path));
+            copies.extend(different.add((name, found), path));
         }
     }
+    let Different { mut detections, files, .. } = different;
     if let Some((copy, first)) = copies.first() {
         let others = match copies.len() - 1 {
             0 => String::new(),
@@ -428,19 +429,30 @@ pub fn is_same(one: &Detection, other: &Detection) -> bool {
     !one.grids.is_empty() && corners.eq(other.grids.iter().map(|grid| &grid.corners))
 }
 
-/// Adds a detection, unless it duplicates another; then returns both files.
-fn add(
-    detections: &mut Vec<(String, Detection)>,
-    files: &mut Vec<PathBuf>,
-    found: (String, Detection),
-    path: PathBuf,
-) -> Option<(PathBuf, PathBuf)> {
-    if let Some(first) = detections.iter().position(|(_, other)| is_same(&found.1, other)) {
-        return Some((path, files[first].clone()));
+/// Detections of different images, with their files.
+#[derive(Default)]
+struct Different {
+    detections: Vec<(String, Detection)>,
+    files: Vec<PathBuf>,
+    /// The detections by the position of their first corner.
+    by_corner: HashMap<Option<[u64; 2]>, Vec<usize>>,
+}
+
+impl Different {
+    /// Adds a detection, unless it duplicates another; then returns both files.
+    fn add(&mut self, found: (String, Detection), path: PathBuf) -> Option<(PathBuf, PathBuf)> {
+        let first = found.1.grids.iter().find_map(|grid| grid.corners.first());
+        let first = first.map(|corner| [corner.x, corner.y].map(f64::to_bits));
+        let others = self.by_corner.entry(first).or_default();
+        let same = others.iter().find(|&&other| is_same(&found.1, &self.detections[other].1));
+        if let Some(&same) = same {
+            return Some((path, self.files[same].clone()));
+        }
+        others.push(self.files.len());
+        self.detections.push(found);
+        self.files.push(path);
+        None
     }
-    detections.push(found);
-    files.push(path);
-    None
 }
 
 /// Reads the detections in tables, in the order that their JSON files would have.
