@@ -84,15 +84,15 @@ pub(crate) struct Local {
     matrix: Vec<f64>,
     pub right: Vec<f64>,
     /// The corners, if they are unknown.
-    pub corners: Vec<OfCorner>,
+    corners: Vec<OfCorner>,
+    /// For each of them, the product with each column of the block.
+    cross: Vec<[f64; 3]>,
 }
 
 /// The contribution of a corner in a block to the equations of its own offset.
 pub(crate) struct OfCorner {
     /// Its index in the map.
     pub index: usize,
-    /// The product with each column of the block.
-    pub cross: Vec<[f64; 3]>,
     pub own: Matrix3<f64>,
     pub right: Vector3<f64>,
 }
@@ -236,8 +236,19 @@ impl Local {
         };
         let n = columns.len() + 6;
         let matrix = vec![0.0; n * (n + 1) / 2];
-        let mut local =
-            Self { cost: 0.0, columns, matrix, right: vec![0.0; n], corners: Vec::new() };
+        let mut local = Self {
+            cost: 0.0,
+            columns,
+            matrix,
+            right: vec![0.0; n],
+            corners: Vec::new(),
+            cross: Vec::new(),
+        };
+        if problem.map.is_some() {
+            let count = block.observations.len();
+            (local.corners, local.cross) =
+                (Vec::with_capacity(count), Vec::with_capacity(n * count));
+        }
         let mut rows = [[0.0; LONGEST_ROW]; 2];
         // For a spline: the columns of the corner, that is, of its knots and all columns after those of the lens.
         let mut places: Vec<usize> = Vec::new();
@@ -275,14 +286,26 @@ impl Local {
                 None => local.add(rows, residual, w, loss, sigma),
             };
             if let Some(index) = mapped {
-                let mut corner = OfCorner::new(index, rows, by_place, residual, w, weight);
-                if support.is_some() {
-                    corner.spread(&places, n);
-                }
+                let (corner, cross) = OfCorner::new(index, rows, by_place, residual, w, weight);
                 local.corners.push(corner);
+                if support.is_some() {
+                    let first = local.cross.len();
+                    local.cross.resize(first + n, [0.0; 3]);
+                    places
+                        .iter()
+                        .zip(cross)
+                        .for_each(|(place, of)| local.cross[first + place] = of);
+                } else {
+                    local.cross.extend(cross);
+                }
             }
         }
         Some(local)
+    }
+
+    /// The corners, if they are unknown, each with the product with each column of the block.
+    pub(crate) fn corners(&self) -> impl Iterator<Item = (&OfCorner, &[[f64; 3]])> {
+        self.corners.iter().zip(self.cross.chunks_exact(self.right.len()))
     }
 
     /// A row of the lower triangle, up to the diagonal.
@@ -346,30 +369,24 @@ impl Local {
 }
 
 impl OfCorner {
-    /// Expands the products from some columns to all columns of a block.
-    fn spread(&mut self, places: &[usize], n: usize) {
-        let mut cross = vec![[0.0; 3]; n];
-        places.iter().zip(&self.cross).for_each(|(&place, values)| cross[place] = *values);
-        self.cross = cross;
-    }
-
-    fn new(
+    /// The contribution of a corner, and the product with each of its columns.
+    fn new<'a>(
         index: usize,
-        [along_x, along_y]: [&[f64]; 2],
+        [along_x, along_y]: [&'a [f64]; 2],
         by_place: [DVec3; 2],
         residual: DVec2,
         w: [f64; 3],
         weight: f64,
-    ) -> Self {
+    ) -> (Self, impl Iterator<Item = [f64; 3]> + 'a) {
         let r = Whitening::apply(w, residual);
         let [a, b, c] = w;
         let (x, y) = (a * by_place[0], b * by_place[0] + c * by_place[1]);
         // With respect to the residual before whitening.
         let (by_x, by_y) = (weight * (a * x + b * y), weight * (c * y));
         let cross = along_x.iter().zip(along_y);
-        let cross = cross.map(|(&of_x, &of_y)| (by_x * of_x + by_y * of_y).to_array());
+        let cross = cross.map(move |(&of_x, &of_y)| (by_x * of_x + by_y * of_y).to_array());
         let own = Matrix3::from_fn(|k, l| by_x[k] * by_place[0][l] + by_y[k] * by_place[1][l]);
         let right = weight * (x * r.x + y * r.y);
-        Self { index, cross: cross.collect(), own, right: right.to_array().into() }
+        (Self { index, own, right: right.to_array().into() }, cross)
     }
 }

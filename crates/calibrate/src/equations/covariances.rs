@@ -4,6 +4,7 @@ use deltille_core::damping::Damping;
 use std::collections::BTreeSet;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix};
+use rayon::prelude::*;
 
 use super::cholesky::{cholesky, inverse};
 use super::layout::Layout;
@@ -70,17 +71,19 @@ impl Normal {
     pub(crate) fn covariances(&self, layout: &Layout) -> Option<Covariances> {
         let Reduced { matrix, inverses, .. } = self.reduced(Damping::NONE)?;
         let Inverse { matrix: kept, root, loose, tied } = self.invert(matrix)?;
-        let mut parts = Vec::with_capacity(inverses.len());
-        for first in (0..inverses.len()).step_by(PARTS_AT_A_TIME) {
+        let firsts: Vec<usize> = (0..inverses.len()).step_by(PARTS_AT_A_TIME).collect();
+        let some_parts = |first: usize| {
             let some = first..(first + PARTS_AT_A_TIME).min(inverses.len());
             let through = self.through(&inverses, some.clone());
             let carried = &kept * &through;
-            for (index, inverse) in inverses[some].iter().enumerate() {
+            let of_part = |(index, inverse): (usize, &DMatrix<f64>)| {
                 let (first, size) = (index * inverse.nrows(), inverse.nrows());
                 let carried = carried.columns(first, size);
-                parts.push(inverse + through.columns(first, size).tr_mul(&carried));
-            }
-        }
+                inverse + through.columns(first, size).tr_mul(&carried)
+            };
+            inverses[some].iter().enumerate().map(of_part).collect::<Vec<_>>()
+        };
+        let parts = firsts.into_par_iter().map(some_parts).collect::<Vec<_>>().concat();
         let (frames, corners) = match (layout.frames, layout.corners) {
             (Some(first), _) => (blocks(&kept, first), parts.iter().map(fixed).collect()),
             (None, Some(first)) => (parts.iter().map(fixed).collect(), blocks(&kept, first)),

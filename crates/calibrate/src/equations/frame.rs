@@ -36,7 +36,7 @@ impl OfFrame {
         let mut right = DVector::zeros(n);
         for local in &self.locals {
             local.columns.iter().zip(&local.right).for_each(|(&row, value)| right[row] += value);
-            for corner in &local.corners {
+            for (corner, _) in local.corners() {
                 let mut own = right.fixed_rows_mut::<3>(self.shared + 3 * corner.index);
                 own += corner.right;
             }
@@ -52,11 +52,10 @@ impl OfFrame {
             for (i, &column) in local.columns.iter().enumerate() {
                 each(column, Vector6::from_fn(|pose, _| local.row(of_shared + pose)[i]));
             }
-            for corner in &local.corners {
-                for k in 0..3 {
-                    let across = Vector6::from_fn(|pose, _| corner.cross[of_shared + pose][k]);
-                    each(self.shared + 3 * corner.index + k, across);
-                }
+            for (corner, cross) in local.corners() {
+                let of_pose = &cross[of_shared..];
+                let first = self.shared + 3 * corner.index;
+                (0..3).for_each(|k| each(first + k, Vector6::from_fn(|pose, _| of_pose[pose][k])));
             }
         }
     }
@@ -73,11 +72,11 @@ impl OfFrame {
                     }
                 }
             }
-            for corner in &local.corners {
+            for (corner, cross) in local.corners() {
                 let first = self.shared + 3 * corner.index;
                 let own = corner.own * vector.fixed_rows::<3>(first);
                 (0..3).for_each(|k| product[first + k] += own[k]);
-                for (&column, values) in local.columns.iter().zip(&corner.cross) {
+                for (&column, values) in local.columns.iter().zip(cross) {
                     for (k, value) in values.iter().enumerate() {
                         product[first + k] += value * vector[column];
                         product[column] += value * vector[first + k];
@@ -95,8 +94,8 @@ impl OfFrame {
     /// Adds the coupling between the shared unknowns (rows) and the offsets of all corners (columns).
     pub(crate) fn add_across(&self, across: &mut DMatrix<f64>) {
         for local in &self.locals {
-            for corner in &local.corners {
-                for (&row, values) in local.columns.iter().zip(&corner.cross) {
+            for (corner, cross) in local.corners() {
+                for (&row, values) in local.columns.iter().zip(cross) {
                     for (k, value) in values.iter().enumerate() {
                         across[(row, 3 * corner.index + k)] += value;
                     }

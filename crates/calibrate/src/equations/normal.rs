@@ -180,16 +180,25 @@ impl Normal {
             }
             part.right[i] += right;
         }
-        local.corners.iter().for_each(|corner| self.add_corner(layout, local, corner, frame));
+        for (corner, cross) in local.corners() {
+            self.add_corner(layout, &local.columns, corner, cross, frame);
+        }
     }
 
     /// Adds the contribution of a block to the equations of a corner's offset.
-    fn add_corner(&mut self, layout: &Layout, local: &Local, corner: &OfCorner, frame: usize) {
-        let (of_shared, of_frame) = corner.cross.split_at(local.columns.len());
+    fn add_corner(
+        &mut self,
+        layout: &Layout,
+        columns: &[usize],
+        corner: &OfCorner,
+        cross: &[[f64; 3]],
+        frame: usize,
+    ) {
+        let (of_shared, of_frame) = cross.split_at(columns.len());
         for k in 0..3 {
             if let Some(first) = layout.corners {
                 let row = first + 3 * corner.index + k;
-                for (&column, values) in local.columns.iter().zip(of_shared) {
+                for (&column, values) in columns.iter().zip(of_shared) {
                     self.a[(row, column)] += values[k];
                 }
                 for (i, values) in of_frame.iter().enumerate() {
@@ -203,7 +212,7 @@ impl Normal {
                 let part = &mut self.parts[corner.index];
                 let of_frame =
                     of_frame.iter().enumerate().map(|(i, of)| (first + 6 * frame + i, of));
-                let of_shared = local.columns.iter().copied().zip(of_shared);
+                let of_shared = columns.iter().copied().zip(of_shared);
                 for (row, values) in of_shared.chain(of_frame) {
                     self.b[(row, 3 * corner.index + k)] += values[k];
                 }
