@@ -33,7 +33,7 @@ impl Calibration {
             findings.extend(beyond);
             CameraViews { views, ..camera.clone() }
         });
-        let own = self.of_cameras(cameras.collect());
+        let mut own = self.of_cameras(cameras.collect());
         let Start { mut problem, frames, mut excluded, delays, rotations } = start(&own)?;
         problem.stop = self.stop.clone();
         let gross = Gross::of(problem).ok_or(CalibrationError::NoStart)?;
@@ -45,18 +45,21 @@ impl Calibration {
             (frames[frame].place, own.without_frame(&frames[frame], &gross, frame, why))
         }));
         excluded.sort_by_key(|(place, _)| *place);
+        // The problem has a copy of the corners.
+        let views = own.cameras.iter_mut().flat_map(|camera| &mut camera.views);
+        views.for_each(|view| view.sightings = Vec::new());
         let settled = own.smoothed(&gross, settled)?;
         let (settled, f_ratio) = match own.board_shape {
             true => own.bent(&gross, settled)?,
             false => (settled, 0.0),
         };
-        let (settled, found) = match own.measure_target {
+        let (mut settled, found) = match own.measure_target {
             true => own.measured(&gross, settled)?,
             false => (settled, None),
         };
         findings.extend(gross.findings(&settled, |frame| frames[frame].name.clone()));
         let kept: Vec<&Frame> = gross.belonging().map(|frame| &frames[frame]).collect();
-        let mut estimate = Estimate::new(&own, &kept, &settled, found, f_ratio)?;
+        let mut estimate = Estimate::new(&own, &kept, &mut settled, found, f_ratio)?;
         let of_cameras = estimate.cameras.iter_mut().zip(delays);
         for ((camera, delay), rotation) in of_cameras.zip(rotations) {
             (camera.delay, camera.label_rotation) = (delay, rotation);

@@ -87,6 +87,7 @@ impl Calibration {
         problem.map = Some(CornerMap::flat(&problem.blocks));
         let mut settled = settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)?;
         for _ in 0..PRIOR_ROUNDS {
+            let factor = settled.minimum.factor.take();
             let Minimum { problem, normal, layout, .. } = &settled.minimum;
             let Some(map) = &problem.map else { break };
             let found = normal.covariances(layout).ok_or(CalibrationError::NoStart)?;
@@ -96,8 +97,9 @@ impl Calibration {
                 return Ok((settled, Some(found)));
             }
             let map = map.clone().expecting(prior_mm, determined);
-            // The equations and the covariances, which may be large, end here.
-            let Settled { minimum: Minimum { factor, .. }, mut problem, .. } = settled;
+            // Releases the equations, which may be large.
+            let Settled { mut problem, .. } = settled;
+            drop(found);
             problem.map = Some(map);
             settled = settle(Kept { problem, factor, ..gross.kept() }, self.weights, self.loss)?;
         }

@@ -15,6 +15,7 @@ use std::collections::BTreeMap;
 use glam::{DMat3, DVec2, DVec3};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
+use crate::input::observation::Observation;
 use crate::input::panel::PanelRef;
 use crate::problem::bundle::Problem;
 use crate::problem::whitening::Whitening;
@@ -72,13 +73,12 @@ pub enum LackOfFit {
 }
 
 /// A corner in a view, whitened.
-struct Seen {
+struct Seen<'a> {
     block: usize,
     camera: usize,
     panel: PanelRef,
+    corner: &'a Observation,
     cell: [i32; 2],
-    label: [i32; 2],
-    position_mm: DVec3,
     residual: DVec2,
     /// Derivative of the residual with respect to the corner's position on the panel, 1/mm.
     by_place: [DVec3; 2],
@@ -153,8 +153,8 @@ pub(crate) fn lack_of_fit(problem: &Problem, whitening: &Whitening) -> Vec<LackO
 }
 
 /// The corners that are not outliers, and the size of a whitened coordinate, px.
-fn seen(problem: &Problem, whitening: &Whitening) -> (Vec<Seen>, f64) {
-    let mut all = Vec::new();
+fn seen<'a>(problem: &'a Problem, whitening: &Whitening) -> (Vec<Seen<'a>>, f64) {
+    let mut all = Vec::with_capacity(problem.count());
     let (mut px, mut white) = (0.0, 0.0);
     for (index, (block, weights)) in problem.blocks.iter().zip(&whitening.blocks).enumerate() {
         let unknowns = &problem.cameras[block.camera];
@@ -180,9 +180,8 @@ fn seen(problem: &Problem, whitening: &Whitening) -> (Vec<Seen>, f64) {
                 block: index,
                 camera: block.camera,
                 panel: block.panel,
+                corner,
                 cell: (corner.pixel / cell_px).floor().as_ivec2().to_array(),
-                label: [corner.row, corner.col],
-                position_mm: corner.panel_mm,
                 residual: whitened,
                 by_place: [a * x, b * x + c * y],
             });
@@ -229,7 +228,8 @@ fn over_image(seen: &[Seen], camera: usize) -> Explained {
 fn over_target(seen: &[Seen]) -> Explained {
     let mut corners: BTreeMap<(PanelRef, [i32; 2]), Vec<usize>> = BTreeMap::new();
     for (index, corner) in seen.iter().enumerate() {
-        corners.entry((corner.panel, corner.label)).or_default().push(index);
+        let label = [corner.corner.row, corner.corner.col];
+        corners.entry((corner.panel, label)).or_default().push(index);
     }
     let mut found = Explained::default();
     for ((panel, _), views) in corners.iter().filter(|(_, views)| views.len() >= MIN_VIEWS) {
@@ -258,11 +258,11 @@ fn over_panels(seen: &[Seen]) -> Explained {
         return found;
     }
     for (&panel, views) in &panels {
-        let places = || views.iter().map(|&index| seen[index].position_mm);
+        let places = || views.iter().map(|&index| seen[index].corner.panel_mm);
         let middle = places().sum::<DVec3>() / views.len() as f64;
         let reach = places().map(|at| at.distance(middle)).fold(f64::MIN_POSITIVE, f64::max);
         // Expresses rotations as lengths at the rim, so that all unknowns have the same unit.
-        let arm = |seen: &Seen| (seen.position_mm - middle) / reach;
+        let arm = |seen: &Seen| (seen.corner.panel_mm - middle) / reach;
         let row = |by: DVec3, seen: &Seen| {
             let turn = arm(seen).cross(by);
             [by.x, by.y, by.z, turn.x, turn.y, turn.z]

@@ -541,6 +541,12 @@ pub(crate) fn within_pictures(views: &[View], camera: usize) -> (Vec<View>, Vec<
         let is_within = |pixel: DVec2| {
             pixel.cmpge(-BEYOND * size).all() && pixel.cmple((1.0 + BEYOND) * size).all()
         };
+        let mut seen = view.sightings.iter().flat_map(|sighting| &sighting.observations);
+        if seen.all(|seen| is_within(seen.pixel))
+            && view.sightings.iter().all(|of| !of.observations.is_empty())
+        {
+            return Some(view.clone());
+        }
         let sightings = view.sightings.iter().map(|sighting| {
             let within = sighting.observations.iter().filter(|seen| is_within(seen.pixel));
             Sighting { panel: sighting.panel, observations: within.copied().collect() }

@@ -205,7 +205,8 @@ impl Calibration {
     /// the views: other models, the shape of the board, and the poses of panels.
     pub fn explain(&self, found: &Estimate) -> Vec<Diagnosis> {
         // `solve` had split off the held-out frames.
-        let own = self.split().map_or_else(|_| self.clone(), |(own, _)| own);
+        let split = self.split();
+        let own = split.as_ref().map_or(self, |(own, _)| own);
         let alone = own.each_alone(found);
         let mut said = said(found, &alone);
         if own.is_single() {

@@ -41,14 +41,14 @@ impl Estimate {
     pub(crate) fn new(
         calibration: &Calibration,
         frames: &[&Frame],
-        settled: &Settled,
+        settled: &mut Settled,
         found: Option<Covariances>,
         f_ratio: f64,
     ) -> Result<Self, CalibrationError> {
         let Calibration { cameras, loss, distances_mm, board_accuracy_mm, .. } = calibration;
         let loss = *loss;
-        let Settled { minimum, whitening, .. } = settled;
-        let Minimum { problem, normal, layout, steps, .. } = minimum;
+        let Settled { minimum, whitening, .. } = &*settled;
+        let Minimum { normal, layout, .. } = minimum;
         let open = |parameters: String| CalibrationError::Undetermined { parameters };
         let found = found.or_else(|| normal.covariances(layout));
         let found = found.ok_or_else(|| open("the poses".to_owned()))?;
@@ -63,6 +63,10 @@ impl Estimate {
             let of_board = board_errors(minimum, whitening, loss, &found, *board_accuracy_mm);
             observed.with(of_board, drawn.as_ref())
         });
+        // Nothing below needs the equations.
+        settled.minimum.normal.release_if_large();
+        let Settled { minimum, whitening, .. } = &*settled;
+        let Minimum { problem, layout, steps, .. } = minimum;
         let states = states(frames, settled, loss);
         let mut views = views(cameras, frames, settled);
         let cameras = cameras.iter().enumerate().map(|(index, camera)| {

@@ -1,5 +1,6 @@
 //! The input of a calibration: cameras with their views, a target, and prior knowledge of both.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
@@ -410,8 +411,8 @@ impl Calibration {
     ///
     /// # Errors
     /// Returns an error if there are too few frames to hold one out.
-    pub(crate) fn split(&self) -> Result<(Self, Option<Self>), CalibrationError> {
-        let Some(every) = self.hold_out else { return Ok((self.clone(), None)) };
+    pub(crate) fn split(&self) -> Result<(Cow<'_, Self>, Option<Self>), CalibrationError> {
+        let Some(every) = self.hold_out else { return Ok((Cow::Borrowed(self), None)) };
         let views = self.cameras.iter().flat_map(|camera| &camera.views);
         let names: BTreeSet<&str> = views.map(|view| view.name.as_str()).collect();
         let names: Vec<&str> = names.into_iter().collect();
@@ -439,6 +440,6 @@ impl Calibration {
             let order = self.moments();
             Self { hold_out: None, order, ..self.of_cameras(cameras.collect()) }
         };
-        Ok((part(false), Some(part(true))))
+        Ok((Cow::Owned(part(false)), Some(part(true))))
     }
 }
