@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
+use crate::equations::factor::Factor;
 use crate::equations::minimise::{Minimum, Until, minimise_with};
-use crate::equations::normal::Factor;
 use crate::error::CalibrationError;
 use crate::input::loss::Loss;
 use crate::input::observation::{MIN_CORNERS, Observation};

@@ -1,7 +1,8 @@
 //! Levenberg–Marquardt: iterates from the values of a problem to the next minimum of the cost.
 
+use super::factor::Factor;
 use super::layout::Layout;
-use super::normal::{Factor, Normal};
+use super::normal::Normal;
 use crate::input::loss::Loss;
 use crate::problem::bundle::Problem;
 use crate::problem::whitening::Whitening;

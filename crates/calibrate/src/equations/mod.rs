@@ -4,14 +4,15 @@
 //!
 //! 1. `layout` assigns a column to every unknown.
 //! 2. `block` forms the equations of one panel in one image, `frame` those of a frame with its pose eliminated.
-//! 3. `normal` sums blocks, eliminates the poses of frames or the offsets of corners, and solves for a step, a change
-//!    of all unknowns (`step`). `cholesky` factors and inverts large matrices by blocks.
+//! 3. `normal` sums blocks, and eliminates the poses of frames or the offsets of corners. `cholesky` factors and inverts
+//!    large matrices by blocks; `factor` solves for a step, a change of all unknowns (`step`).
 //! 4. `minimise` iterates to the minimum (Levenberg–Marquardt).
 //! 5. `covariances` inverts the equations; `local_share` computes the contribution of one frame to the shared unknowns.
 
 pub(crate) mod block;
 mod cholesky;
 pub(crate) mod covariances;
+pub(crate) mod factor;
 pub(crate) mod frame;
 pub(crate) mod layout;
 pub(crate) mod local_share;
