@@ -3,7 +3,8 @@
 use super::config::DetectorConfig;
 use super::levels::{MIN_LEVEL_SIDE, levels_of};
 use super::one_tiling::following::Track;
-use super::one_tiling::{Frame, OneTiling, Search, Timing};
+use super::one_tiling::timing::Timing;
+use super::one_tiling::{Frame, OneTiling, Search};
 use super::scene::{SceneError, check_detectable, check_distinct};
 use crate::labels::grid_labels::Labels;
 use crate::refine::clearance::TagAreas;

@@ -2,11 +2,11 @@
 
 pub(crate) mod following;
 mod refining;
+pub(crate) mod timing;
 
 use std::collections::BTreeMap;
-use std::time::Duration;
 
-use self::refining::Shared;
+use self::timing::Timing;
 use super::config::DetectorConfig;
 use super::nothing_seen::nothing_found;
 use super::tiling::{CHECKER, DELTILLE, kind, step};
@@ -20,7 +20,7 @@ use crate::grid::untagged::tile_shape::{LARGE_INK, is_of_squares};
 use crate::labels::grid_labels::{FoundGrid, Labels, MAX_CORNERS, report_once};
 use crate::labels::placement::labeller::Budget;
 use crate::refine::clearance::{Margin, TagAreas, surroundings};
-use crate::refine::edge_shift::{centre, has_straight_edges};
+use crate::refine::edge_shift::{MAX_SHIFT, centre, has_straight_edges};
 use crate::refine::model::fitter::CornerFitter;
 use crate::refine::optics::Optics;
 use crate::refine::refiner::Refiner;
@@ -77,6 +77,19 @@ pub(super) enum Search {
 
 /// Grids, each with the reason why it has no labels.
 type Judged = Vec<(Grid, Option<Reason>)>;
+
+/// What the refined corners of an image have in common.
+#[derive(Clone, Debug)]
+pub(crate) struct Shared {
+    pub(crate) optics: Optics,
+    /// For each grid, whether blur leaves only its fundamental wave.
+    pub(crate) are_waves: Vec<bool>,
+    /// The blur of each grid, px.
+    pub(crate) blurs: Vec<Option<f64>>,
+    /// Noise of the first grid, as a fraction of full scale; `None` if grids were refined on a coarser level, or from
+    /// their motion or moved edges.
+    pub(crate) noise: Option<f64>,
+}
 
 /// Result for an image.
 struct Found {
@@ -330,7 +343,7 @@ impl OneTiling {
         if is_worth && self.is_sought() && !grids.iter().any(|found| self.is_identified(found)) {
             let found = grids_of_moved_edges(finder, pyramid, self.labels.whole());
             let mut identified = self.plausible::<N>(frame, &found, &mut Vec::new());
-            identified.iter_mut().for_each(|(grid, _)| centre(frame.image, grid));
+            identified.iter_mut().for_each(|(grid, _)| centre(frame.image, grid, MAX_SHIFT));
             // Dots look like squares whose edges have moved.
             identified.retain(|found| {
                 self.is_identified(found)
@@ -598,33 +611,4 @@ fn refiner(kind: GridKind, config: DetectorConfig, edge_mm: Option<f64>) -> Refi
     Refiner::with_radii(kind, config.refinement, POLYNOMIAL_RADIUS, MODEL_RADIUS)
         .with_tone(config.tone)
         .with_ink(ink)
-}
-
-/// Stopwatch of the stages.
-pub(super) struct Timing {
-    /// The clock, and the end of the last stage.
-    last: Option<(Clock, Duration)>,
-    laps: BTreeMap<String, f64>,
-}
-
-impl Timing {
-    fn start(clock: Option<Clock>) -> Self {
-        Self { last: clock.map(|clock| (clock, clock())), laps: BTreeMap::new() }
-    }
-
-    pub(super) fn lap(&mut self, stage: &str) {
-        if let Some((clock, last)) = &mut self.last {
-            let now = clock();
-            *self.laps.entry(stage.to_owned()).or_default() +=
-                now.saturating_sub(*last).as_secs_f64() * 1e3;
-            *last = now;
-        }
-    }
-
-    /// Adds the times to those of other stages, ms.
-    pub(super) fn add_to(self, laps: &mut BTreeMap<String, f64>) {
-        for (stage, ms) in self.laps {
-            *laps.entry(stage).or_default() += ms;
-        }
-    }
 }

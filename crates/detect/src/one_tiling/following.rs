@@ -10,8 +10,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec2;
 use nalgebra::{Matrix3, Vector3};
 
-use super::refining::Shared;
-use super::{Frame, MIN_COARSE_EDGE_PX, OneTiling, Timing, is_labelled};
+use super::timing::Timing;
+use super::{Frame, MIN_COARSE_EDGE_PX, OneTiling, Shared, is_labelled};
 use crate::grid::saddle_grid::{PlacedSaddle, SaddleGrid};
 use crate::labels::grid_labels::FoundGrid;
 use crate::labels::placement::labeller::Budget;

@@ -3,7 +3,7 @@
 
 use std::borrow::Cow;
 
-use super::{Frame, OneTiling};
+use super::{Frame, OneTiling, Shared};
 use crate::grid::saddle_grid::PlacedSaddle;
 use crate::labels::grid_blur::GridBlur;
 use crate::labels::grid_light::{GridLight, TagInsets};
@@ -32,19 +32,6 @@ const MIN_MOTION_BLUR_PX: f64 = 1.5;
 /// Largest displacement of edges by tags that are blurred into them, in standard deviations of the blur.
 const TAG_SHIFT_BLURS: f64 = 1.0;
 
-/// What the refined corners of an image have in common.
-#[derive(Clone, Debug)]
-pub(crate) struct Shared {
-    pub(crate) optics: Optics,
-    /// For each grid, whether blur leaves only its fundamental wave.
-    pub(crate) are_waves: Vec<bool>,
-    /// The blur of each grid, px.
-    pub(crate) blurs: Vec<Option<f64>>,
-    /// Noise of the first grid, as a fraction of full scale; `None` if grids were refined on a coarser level, or from
-    /// their motion or moved edges.
-    pub(crate) noise: Option<f64>,
-}
-
 impl OneTiling {
     /// Refines all grids on the level of the pyramid that suits their blur.
     pub(super) fn refine(
@@ -66,7 +53,7 @@ impl OneTiling {
             refiner = Cow::Owned(self.refiner.with_motion_near(motion.astigmatism()));
         } else if let Some(shift) = shift.filter(|shift| shift.px > by_tags_px) {
             refiner = Cow::Owned(self.refiner.with_ink_near(shift.edges));
-            grids.iter_mut().for_each(|grid| centre(frame.image, grid));
+            grids.iter_mut().for_each(|grid| centre(frame.image, grid, shift.edges));
             least = shift.level(levels.len());
         }
         if matches!(refiner, Cow::Owned(_)) {

@@ -34,7 +34,7 @@ const MAX_EDGES: usize = 48;
 
 /// Largest measured shift, as a fraction of the edge length. Tiles that have lost or gained 30 % on each side are no
 /// longer adjacent to their corners.
-const MAX_SHIFT: f64 = 0.3;
+pub(crate) const MAX_SHIFT: f64 = 0.3;
 
 /// Maximum median deviation of the middle of an edge from two places beside it, as a fraction of its length. A disc that
 /// reaches its diagonal neighbours has 0.046 on a checkerboard, and one that reaches its neighbours 0.053 on a deltille
@@ -85,8 +85,9 @@ pub(crate) fn large_shift(image: ImageView, grids: &[Grid]) -> Option<EdgeShift>
 }
 
 /// Moves the corners of a deltille grid between their edges: three edges that have moved cross in three points, each of
-/// which may be taken for the corner. The edges of a checkerboard lie on both sides of a line in turn and need none of this.
-pub(crate) fn centre(image: ImageView, grid: &mut Grid) {
+/// which may be taken for the corner, at twice the shift from it. No corner is moved by more than that for a `shift`, as a
+/// fraction of the edge length. The edges of a checkerboard lie on both sides of a line in turn and need none of this.
+pub(crate) fn centre(image: ImageView, grid: &mut Grid, shift: f64) {
     if grid.kind == GridKind::Checker {
         return;
     }
@@ -99,7 +100,10 @@ pub(crate) fn centre(image: ImageView, grid: &mut Grid) {
                 shifts.entry(end).or_default().extend(shift);
             }
         }
-        let common = offset(shifts.values().flatten());
+        let is_near = |&[first, second]: &[f64; 2]| {
+            grid.kind.position(second, first).length() <= gap(grid.kind) * shift.abs()
+        };
+        let common = offset(shifts.values().flatten()).filter(is_near);
         let before = positions(grid);
         let along = |vertex: Vertex, step: Vertex| {
             let ahead = before.get(&(vertex + step)).map(|next| *next - before[&vertex]);
@@ -108,6 +112,7 @@ pub(crate) fn centre(image: ImageView, grid: &mut Grid) {
         for corner in &mut grid.corners {
             let vertex = Vertex::new(corner.row, corner.col);
             let here = shifts.get(&vertex).and_then(|shifts| offset(shifts.iter()));
+            let here = here.filter(is_near);
             let Some(offset) = here.or(common) else { continue };
             let way = [0, 1].map(|i| along(vertex, steps[i]).unwrap_or(DVec2::ZERO) * offset[i]);
             corner.move_to(corner.position() - way[0] - way[1]);
