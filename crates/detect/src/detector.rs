@@ -3,9 +3,9 @@
 use super::config::DetectorConfig;
 use super::levels::{MIN_LEVEL_SIDE, levels_of};
 use super::one_tiling::following::Track;
-use super::one_tiling::timing::Timing;
 use super::one_tiling::{Frame, OneTiling, Search};
 use super::scene::{SceneError, check_detectable, check_distinct};
+use super::timing::Timing;
 use crate::labels::grid_labels::Labels;
 use crate::refine::clearance::TagAreas;
 use deltille_core::Clock;

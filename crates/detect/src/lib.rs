@@ -18,7 +18,8 @@
 //! target if none is given. `scene` checks whether several targets can be distinguished. A module imports only from
 //! modules above it in this list.
 //!
-//! Both tilings share the code: `tiling` contains the differences, and `lanes` the number of SIMD lanes.
+//! Both tilings share the code: `tiling` contains the differences, and `lanes` the number of SIMD lanes. `timing` measures
+//! the stages.
 
 mod config;
 mod corners;
@@ -33,6 +34,7 @@ mod recognise;
 mod refine;
 mod scene;
 mod tiling;
+mod timing;
 mod tracker;
 mod transformed;
 

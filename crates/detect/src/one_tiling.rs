@@ -2,14 +2,13 @@
 
 pub(crate) mod following;
 mod refining;
-pub(crate) mod timing;
 
 use std::collections::BTreeMap;
 
-use self::timing::Timing;
 use super::config::DetectorConfig;
 use super::nothing_seen::nothing_found;
 use super::tiling::{CHECKER, DELTILLE, kind, step};
+use super::timing::Timing;
 use crate::corners::ring;
 use crate::corners::saddles::{Saddle, SaddleFinder, too_many};
 use crate::grid::grids::grids;

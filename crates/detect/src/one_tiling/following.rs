@@ -10,7 +10,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec2;
 use nalgebra::{Matrix3, Vector3};
 
-use super::timing::Timing;
 use super::{Frame, MIN_COARSE_EDGE_PX, OneTiling, Shared, is_labelled};
 use crate::grid::saddle_grid::{PlacedSaddle, SaddleGrid};
 use crate::labels::grid_labels::FoundGrid;
@@ -18,6 +17,7 @@ use crate::labels::placement::labeller::Budget;
 use crate::refine::clearance::Prediction;
 use crate::refine::model::fitter::CornerFitter;
 use crate::refine::optics::Optics;
+use crate::timing::Timing;
 use deltille_core::detection::{Detection, Grid, GridCorner};
 use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::raster::{ImageView, Pyramid};
