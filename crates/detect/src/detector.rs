@@ -241,10 +241,16 @@ impl Detector {
         tracks: &[Option<Track>],
         name: &str,
     ) -> Option<(Detection, Vec<Option<Track>>)> {
-        let follow = |(i, of): (usize, &OneTiling)| {
-            of.follow(frame, tracks.get(i)?.as_ref()?, of.timing(), name)
+        let is_due = tracks.iter().flatten().any(Track::is_due);
+        if tracks.iter().all(Option::is_none) || is_due && tracks.iter().any(Option::is_none) {
+            return None;
+        }
+        let follow = |(of, track): (&OneTiling, &Option<Track>)| match track {
+            Some(track) => of.follow(frame, track, of.timing(), name),
+            // Searched again when it is due.
+            None => Some((of.nothing(frame.image, name), None)),
         };
-        let followed: Option<Vec<_>> = self.tilings().enumerate().map(follow).collect();
+        let followed: Option<Vec<_>> = self.tilings().zip(tracks).map(follow).collect();
         let (found, tracks): (Vec<Detection>, Vec<_>) = followed?.into_iter().unzip();
         Some((self.of_all(found.into_iter()), tracks))
     }

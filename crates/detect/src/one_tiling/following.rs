@@ -77,9 +77,16 @@ struct TrackedGrid {
     absent: BTreeMap<Vertex, bool>,
 }
 
+impl Track {
+    /// Returns whether what is missing is searched for in the next image.
+    pub(crate) fn is_due(&self) -> bool {
+        self.age + 1 >= SEARCH_EVERY
+    }
+}
+
 impl OneTiling {
-    /// Returns the track that begins with the grids of a searched image, if all of them are labelled. `before` is the track
-    /// up to the image before it.
+    /// Returns the track that begins with the labelled grids of a searched image. `before` is the track up to the image
+    /// before it.
     pub(crate) fn track(
         &self,
         image: ImageView,
@@ -87,25 +94,22 @@ impl OneTiling {
         shared: Shared,
         before: Option<&Track>,
     ) -> Option<Track> {
-        let Shared { optics, noise, blurs, .. } = shared;
-        let can_be_followed = |grid: &Grid| {
-            !grid.mirrored && (is_labelled(grid) || self.is_whole(grid)) && self.is_sought()
-        };
-        if grids.is_empty() || !grids.iter().all(can_be_followed) {
-            return None;
+        let Shared { optics, noise, mut blurs, .. } = shared;
+        if blurs.len() != grids.len() {
+            // Some grids were dropped after refinement.
+            blurs = vec![None; grids.len()];
         }
-        let tracked = grids.iter().map(|grid| TrackedGrid {
-            absent: self.missing_beside(image, grid),
-            ..TrackedGrid::after(grid, before)
-        });
-        Some(Track {
-            grids: tracked.collect(),
-            optics,
-            noise: noise?,
-            blurs,
-            is_steady: true,
-            age: 0,
-        })
+        let can_be_followed = |(grid, _): &(&Grid, _)| {
+            !grid.mirrored && self.is_sought() && (is_labelled(grid) || self.is_whole(grid))
+        };
+        let tracked = |(grid, blur_px): (&Grid, Option<f64>)| {
+            let absent = self.missing_beside(image, grid);
+            (TrackedGrid { absent, ..TrackedGrid::after(grid, before) }, blur_px)
+        };
+        let followed = grids.iter().zip(blurs).filter(can_be_followed).map(tracked);
+        let (grids, blurs): (Vec<TrackedGrid>, Vec<Option<f64>>) = followed.unzip();
+        let is_any = !grids.is_empty();
+        is_any.then_some(Track { grids, optics, noise: noise?, blurs, is_steady: true, age: 0 })
     }
 
     /// Returns the detection of the next image, and the track from there. Returns `None` if the image has to be searched.
@@ -117,7 +121,7 @@ impl OneTiling {
         name: &str,
     ) -> Option<(Detection, Option<Track>)> {
         let is_complete = track.grids.len() == 1 && self.is_whole(&track.grids[0].grid);
-        if track.age + 1 >= SEARCH_EVERY && !is_complete {
+        if track.is_due() && !is_complete {
             return None;
         }
         let moved: Option<Vec<Grid>> =
@@ -172,6 +176,11 @@ impl OneTiling {
         let refined = self.refine(&mut fitter, frame, grids);
         let is_steady = refined.noise.is_some_and(|now| is_about(now, *noise));
         (refined, is_steady)
+    }
+
+    /// Returns the detection of an image that was not searched.
+    pub(crate) fn nothing(&self, image: ImageView, name: &str) -> Detection {
+        self.detection(image, name, Vec::new(), &Optics::default(), self.timing())
     }
 
     /// Returns a grid with its corners at the positions to which they have moved in this image; `None` if they are not
