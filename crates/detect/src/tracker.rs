@@ -7,14 +7,14 @@ use super::one_tiling::{Frame, Search};
 use deltille_core::detection::Detection;
 use deltille_core::raster::{ImageView, Pyramid};
 
-/// Detects targets in successive images of a video, several times as fast as in single images.
+/// Detects targets in successive images of a video, in a third of the time that single images take.
 ///
 /// The corners are predicted from the last images, and refined there. Some of the tags, or the outline of an untagged
-/// board, have to confirm their labels with the evidence that [`Detector`] requires. If that fails, if more of a target
-/// comes into view, and from time to time if not all of it is visible, the image is searched like a single one. Corners agree
-/// with those of [`Detector`] within a fraction of their standard deviations. [`Grid::tags`](crate::Grid::tags) contains
-/// only the tags that were read again. While no grid is in view, nine of ten images are not searched for boards that are
-/// strongly foreshortened, very small, or have moved edges.
+/// board, have to confirm their labels with the evidence that [`Detector`] requires. An image is searched like a single one
+/// if that fails, if the model does not fit at every corner, if corners appear beside a board, and from time to time if not
+/// all of the targets is visible. [`Grid::tags`](crate::Grid::tags) contains only the tags that were read in the image.
+/// While no grid is in view, nine of ten images are not searched for boards that are strongly foreshortened, very small, or
+/// have moved edges.
 ///
 /// ```
 /// use deltille_core::raster::Gray;
@@ -92,7 +92,7 @@ impl Tracker {
 mod tests {
     use std::collections::BTreeMap;
 
-    use glam::{DVec2, DVec3};
+    use glam::DVec3;
 
     use super::*;
     use deltille_core::camera::{Camera, Pose};
@@ -104,21 +104,23 @@ mod tests {
 
     const SIZE: [u32; 2] = [800, 600];
 
-    /// Renders a board from a camera that moves by these mm, and returns its tracker.
-    fn video(spec: BoardSpec, ways: &[DVec2]) -> (Tracker, Vec<Gray<u8>>) {
-        let board = Printing::new("board", spec).unwrap();
+    /// Renders a board from a camera that moves by these mm.
+    fn video(board: &Printing, ways: &[DVec3]) -> Vec<Gray<u8>> {
         let sheets = board.draw().unwrap().sheets;
-        let scene = scene_of_sheet(&board, &sheets[0], 0);
+        let scene = scene_of_sheet(board, &sheets[0], 0);
         let camera = Camera::pinhole(SIZE[0], SIZE[1], 1.0);
-        let shown = |(i, way): (usize, &DVec2)| {
+        let shown = |(i, way): (usize, &DVec3)| {
             let middle = DVec3::new(90.0 + way.x, 70.0 + way.y, 0.0);
-            let from = middle + DVec3::new(20.0, -50.0, 330.0);
+            let from = middle + DVec3::new(20.0 + way.z, -50.0, 330.0);
             let pose = Pose::looking_at(from, middle, DVec3::Y);
             let light = Light::default().noise(0.008).seed(i as u64);
             scene.render(&camera, &pose, &light).map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
         };
-        let images = ways.iter().enumerate().map(shown).collect();
-        (Tracker::new(Detector::new(&board.target).unwrap()), images)
+        ways.iter().enumerate().map(shown).collect()
+    }
+
+    fn tracker(board: &Printing) -> Tracker {
+        Tracker::new(Detector::new(&board.target).unwrap())
     }
 
     fn corners(found: &Detection) -> BTreeMap<(Option<u32>, i32, i32), GridCorner> {
@@ -128,17 +130,20 @@ mod tests {
         of_grids.collect()
     }
 
-    /// Follows the board while it moves smoothly, also after a jump by the distance of two corners, and finds what detection
-    /// finds.
+    /// Follows the board while it moves smoothly, also after a jump by the distance of two corners or a sudden tilt, and finds
+    /// what detection finds.
     #[test]
     fn corners_are_those_of_single_images() {
         let edge_mm = 20.0;
-        let smooth = |i: f64| DVec2::new(30.0 * (i / 4.0).sin(), 20.0 * (i / 3.0).cos());
-        let mut ways: Vec<DVec2> = (0..8).map(|i| smooth(i.into())).collect();
-        let jump = DVec2::new(edge_mm, 0.0);
-        ways.extend((8..12).map(|i| smooth(i.into()) + jump));
+        let smooth = |i: f64| DVec3::new(30.0 * (i / 4.0).sin(), 20.0 * (i / 3.0).cos(), 0.0);
+        let mut ways: Vec<DVec3> = (0..8).map(|i| smooth(i.into())).collect();
+        ways.extend((8..12).map(|i| smooth(i.into()) + DVec3::new(edge_mm, 0.0, 0.0)));
+        ways.extend(
+            (12..16).map(|i| smooth(11.0) + DVec3::new(edge_mm, 0.0, f64::from(i % 2 * 60))),
+        );
         for spec in [BoardSpec::deltille(7, 8, edge_mm), BoardSpec::checkerboard(7, 8, edge_mm)] {
-            let (mut tracker, images) = video(spec, &ways);
+            let board = Printing::new("board", spec).unwrap();
+            let (mut tracker, images) = (tracker(&board), video(&board, &ways));
             let mut followed = Vec::new();
             for (i, image) in images.iter().enumerate() {
                 let (found, alone) =
@@ -160,7 +165,8 @@ mod tests {
     /// A board that disappears is not followed, and found again.
     #[test]
     fn a_board_that_is_gone_is_not_followed() {
-        let (mut tracker, images) = video(BoardSpec::deltille(7, 8, 20.0), &[DVec2::ZERO; 4]);
+        let board = Printing::new("board", BoardSpec::deltille(7, 8, 20.0)).unwrap();
+        let (mut tracker, images) = (tracker(&board), video(&board, &[DVec3::ZERO; 4]));
         let empty = Gray::from_fn(SIZE[0] as usize, SIZE[1] as usize, |x, y| (x * 7 + y * 3) as u8);
         for (image, grids) in [(&images[0], 1), (&images[1], 1), (&empty, 0), (&images[2], 1)] {
             assert_eq!(tracker.detect(image, "").grids.len(), grids);
@@ -171,5 +177,30 @@ mod tests {
         tracker.reset();
         tracker.detect(&images[3], "");
         assert!(!tracker.has_followed());
+    }
+
+    /// A larger board in the place of another is not labelled, because corners appear beyond the border.
+    #[test]
+    fn a_larger_board_is_not_followed() {
+        for shape in [BoardSpec::deltille, BoardSpec::checkerboard] {
+            let board = |cols| {
+                let spec = BoardSpec { tags: None, ..shape(7, cols, 20.0) };
+                Printing::new("board", spec).unwrap()
+            };
+            let (small, large) = (board(8), board(9));
+            // Both are printed in the middle of the page, so their corners are half an edge apart.
+            for half_mm in [-10.0, 0.0, 10.0] {
+                let mut tracker = tracker(&small);
+                for image in video(&small, &[DVec3::ZERO; 3]) {
+                    assert_eq!(tracker.detect(&image, "").grids.len(), 1);
+                }
+                assert!(tracker.has_followed());
+                for image in video(&large, &[DVec3::new(half_mm, 0.0, 0.0); 3]) {
+                    let found = tracker.detect(&image, "");
+                    assert!(!tracker.has_followed());
+                    assert!(found.grids.iter().all(|grid| grid.panel.is_none()));
+                }
+            }
+        }
     }
 }

@@ -11,6 +11,7 @@ use glam::DVec2;
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Frame, MIN_COARSE_EDGE_PX, OneTiling, Shared, is_labelled};
+use crate::corners::ring;
 use crate::grid::saddle_grid::{PlacedSaddle, SaddleGrid};
 use crate::labels::grid_labels::FoundGrid;
 use crate::labels::placement::labeller::Budget;
@@ -23,8 +24,16 @@ use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::raster::{ImageView, Pyramid};
 use deltille_core::statistics::median;
 
-/// Number of images after which corners that are missing, or other panels, are searched for again.
+/// Number of images after which missing corners of a single board are searched for again. Most of them are noticed when
+/// they appear.
 const SEARCH_EVERY: usize = 10;
+
+/// The same for other panels and targets, of which nothing is predicted.
+const SEARCH_PANELS_EVERY: usize = 3;
+
+/// Number of corners beyond a board, in places without corners before, from which another board may be in view. Single
+/// ones are tips of tiles.
+const BEYOND: usize = 3;
 
 /// Maximum number of corners whose motion is measured; it has six parameters.
 const MOTION_CORNERS: usize = 40;
@@ -42,17 +51,14 @@ const ROUNDS: usize = 3;
 /// Deviation from the common motion up to which a corner agrees, px of the level.
 const AGREES_PX: f64 = 0.75;
 
-/// Minimum fraction of the corners in the image that refinement keeps.
-const MIN_KEPT: f64 = 0.8;
-
 /// Maximum change of the noise under the same optics, as a ratio. The median over a hundred corners scatters by 2 %.
 const MAX_NOISE_RATIO: f64 = 1.1;
 
 /// Number of tags that confirm the labels of a grid. Each alone is evidence enough in a usual family.
 const TAGS: usize = 5;
 
-/// Distance of a corner from the side of the image from which it is visible, in edges.
-const CLEAR_EDGES: f64 = 0.5;
+/// Minimum distance of a corner from the side of the image, px: the circle on which corners are searched for.
+const CLEAR_PX: f64 = ring::RADIUS as f64;
 
 /// The labelled grids of an image and its optics, from which the next image starts.
 #[derive(Clone, Debug)]
@@ -73,14 +79,24 @@ struct TrackedGrid {
     grid: Grid,
     /// Displacements since the image before, px.
     steps: BTreeMap<Vertex, DVec2>,
-    /// Corners in the image that the last search did not find, and whether the polynomial found something there.
-    absent: BTreeMap<Vertex, bool>,
+    /// Vertices beside it that had no corner when it was last searched for, and whether the polynomial found something
+    /// there.
+    beside: BTreeMap<Vertex, Beside>,
+}
+
+/// A vertex beside a grid.
+#[derive(Clone, Copy, Debug)]
+struct Beside {
+    /// Whether the polynomial finds a corner there.
+    is_seen: bool,
+    /// Whether it belongs to the panel.
+    is_on_panel: bool,
 }
 
 impl Track {
-    /// Returns whether what is missing is searched for in the next image.
+    /// Returns whether other panels are searched for in the next image.
     pub(crate) fn is_due(&self) -> bool {
-        self.age + 1 >= SEARCH_EVERY
+        self.age + 1 >= SEARCH_PANELS_EVERY
     }
 }
 
@@ -103,8 +119,8 @@ impl OneTiling {
             !grid.mirrored && self.is_sought() && (is_labelled(grid) || self.is_whole(grid))
         };
         let tracked = |(grid, blur_px): (&Grid, Option<f64>)| {
-            let absent = self.missing_beside(image, grid);
-            (TrackedGrid { absent, ..TrackedGrid::after(grid, before) }, blur_px)
+            let beside = self.beside(image, grid);
+            (TrackedGrid { beside, ..TrackedGrid::after(grid, before) }, blur_px)
         };
         let followed = grids.iter().zip(blurs).filter(can_be_followed).map(tracked);
         let (grids, blurs): (Vec<TrackedGrid>, Vec<Option<f64>>) = followed.unzip();
@@ -121,28 +137,29 @@ impl OneTiling {
         name: &str,
     ) -> Option<(Detection, Option<Track>)> {
         let is_complete = track.grids.len() == 1 && self.is_whole(&track.grids[0].grid);
-        if track.is_due() && !is_complete {
+        let is_only_panel = self.labels.whole().is_some();
+        let every = if is_only_panel { SEARCH_EVERY } else { SEARCH_PANELS_EVERY };
+        if track.age + 1 >= every && !is_complete {
             return None;
         }
         let moved: Option<Vec<Grid>> =
             track.grids.iter().map(|tracked| self.moved(frame, tracked)).collect();
         let mut grids = moved?;
-        let appears = |(grid, tracked): (&Grid, &TrackedGrid)| {
-            let beside = self.missing_beside(frame.image, grid);
-            beside.into_iter().any(|(vertex, is_seen)| match tracked.absent.get(&vertex) {
-                Some(was_seen) => is_seen && !was_seen,
-                None => true,
-            })
+        let is_new = |(grid, tracked): (&Grid, &TrackedGrid)| {
+            let now = self.beside(frame.image, grid).into_iter();
+            tracked.is_new_beside(now)
         };
-        if grids.iter().zip(&track.grids).any(appears) {
+        if grids.iter().zip(&track.grids).any(is_new) {
             return None;
         }
         timing.lap("follow");
         let counts: Vec<usize> = grids.iter().map(|grid| grid.corners.len()).collect();
         let (refined, is_steady) = self.refine_moved(frame, &mut grids, track);
         timing.lap("refine");
-        let is_kept =
-            |(grid, count): (&Grid, &usize)| grid.corners.len() as f64 >= MIN_KEPT * *count as f64;
+        // Where the model fails, something has changed, or the prediction was wrong.
+        let is_kept = |(grid, count): (&Grid, &usize)| {
+            grid.corners.len() == *count && grid.corners.iter().all(|corner| corner.cov.is_some())
+        };
         let is_lost = !grids.iter().zip(&counts).all(is_kept) || refined.are_waves.contains(&true);
         if is_lost || !grids.iter_mut().all(|grid| self.confirm(frame.image, grid, track.age)) {
             return None;
@@ -151,7 +168,7 @@ impl OneTiling {
         let found = self.detection(frame.image, name, grids.clone(), &refined.optics, timing);
         let next = refined.noise.map(|noise| {
             let tracked = grids.iter().zip(&track.grids).map(|(grid, before)| TrackedGrid {
-                absent: before.absent.clone(),
+                beside: before.beside.clone(),
                 ..TrackedGrid::after(grid, Some(track))
             });
             let Shared { optics, blurs, .. } = refined;
@@ -205,7 +222,7 @@ impl OneTiling {
         let motion = affine_motion(found, AGREES_PX * f64::from(1u32 << level), least)?;
         grid.corners.retain_mut(|corner| {
             corner.move_to(corner.position() + motion(corner.position()));
-            is_inside(frame.image, corner.position(), 0.0)
+            is_inside(frame.image, corner.position())
         });
         Some(grid)
     }
@@ -259,26 +276,21 @@ impl OneTiling {
         self.labels.whole().is_some_and(|whole| whole.corners() == grid.corners.len())
     }
 
-    /// Returns the missing corners next to those of a grid that are predicted in the image, and whether the polynomial finds
-    /// something there.
-    fn missing_beside(&self, image: ImageView, grid: &Grid) -> BTreeMap<Vertex, bool> {
+    /// Returns the vertices next to a grid, on its panel or beyond, that are predicted in the image.
+    fn beside(&self, image: ImageView, grid: &Grid) -> BTreeMap<Vertex, Beside> {
         let Some(panel) = self.labels.panel_of(grid) else { return BTreeMap::new() };
-        if grid.corners.len() == panel.corners.len() {
-            return BTreeMap::new();
-        }
         let vertex = |corner: &GridCorner| Vertex::new(corner.row, corner.col);
         let known: BTreeSet<Vertex> = grid.corners.iter().map(vertex).collect();
         let neighbours = known.iter().flat_map(|&vertex| grid.kind.neighbours(vertex));
-        let missing: BTreeSet<Vertex> = neighbours
-            .filter(|vertex| panel.corners.contains(vertex) && !known.contains(vertex))
-            .collect();
+        let missing: BTreeSet<Vertex> =
+            neighbours.filter(|vertex| !known.contains(vertex)).collect();
         let predicted = Prediction::from(grid);
-        let margin_px = CLEAR_EDGES * grid.edge_px().unwrap_or(0.0);
         let look = |vertex: Vertex| {
-            let (place, sd_px) = predicted.at(vertex)?;
+            let (place, sd_px) = predicted.at(vertex).filter(|(at, _)| is_inside(image, *at))?;
             let found = self.refiner.found(image, place);
             let is_near = |found: DVec2| found.distance(place) <= AGREES_PX.max(3.0 * sd_px);
-            is_inside(image, place, margin_px).then(|| (vertex, found.is_some_and(is_near)))
+            let is_seen = found.is_some_and(is_near);
+            Some((vertex, Beside { is_seen, is_on_panel: panel.corners.contains(&vertex) }))
         };
         missing.into_iter().filter_map(look).collect()
     }
@@ -299,7 +311,23 @@ impl TrackedGrid {
             Some((vertex, corner.position() - *last.get(&vertex)?))
         };
         let steps = grid.corners.iter().filter_map(step).collect();
-        Self { grid: grid.clone(), steps, absent: BTreeMap::new() }
+        Self { grid: grid.clone(), steps, beside: BTreeMap::new() }
+    }
+
+    /// Returns whether a corner of the panel may have come into view, or a part of another board.
+    fn is_new_beside(&self, now: impl Iterator<Item = (Vertex, Beside)>) -> bool {
+        let mut beyond = 0;
+        for (vertex, Beside { is_seen, is_on_panel }) in now {
+            let is_new = match self.beside.get(&vertex) {
+                Some(before) => is_seen && !before.is_seen,
+                None => is_on_panel || is_seen,
+            };
+            if is_new && is_on_panel {
+                return true;
+            }
+            beyond += usize::from(is_new);
+        }
+        beyond >= BEYOND
     }
 
     /// Returns the grid with its corners where they are if they have moved like before.
@@ -374,7 +402,8 @@ fn shortest_edge_px(grid: &Grid) -> f64 {
     edges.fold(f64::INFINITY, f64::min)
 }
 
-fn is_inside(image: ImageView, place: DVec2, margin_px: f64) -> bool {
+/// Returns whether a corner may be seen at a position.
+fn is_inside(image: ImageView, place: DVec2) -> bool {
     let size = DVec2::new(image.width() as f64, image.height() as f64) - 1.0;
-    (place.min(size - place)).min_element() >= margin_px
+    place.min(size - place).min_element() >= CLEAR_PX
 }

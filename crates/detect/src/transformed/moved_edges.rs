@@ -24,6 +24,10 @@ use crate::levels::MIN_LEVEL_SIDE;
 use crate::tiling::CHECKER;
 use deltille_core::raster::{Gray, Pyramid};
 
+/// Number of corners by which a grid may exceed the whole board that another view shows: tips of tiles beyond its border.
+/// A larger board exceeds it by a whole row.
+const FALSE_CORNERS: usize = 2;
+
 /// Returns the grids of the level and the displacement that show the whole board or the largest grid, in px of level 0.
 pub(crate) fn grids_of_moved_edges<const N: usize>(
     finder: &SaddleFinder<N>,
@@ -51,10 +55,9 @@ pub(crate) fn grids_of_moved_edges<const N: usize>(
         ways.into_par_iter().flat_map_iter(|way| way()).collect()
     };
     let (mut best, mut may_be_finer) = (Vec::new(), true);
-    // A larger one than the whole board has false corners.
     let worth = |grids: &[SaddleGrid]| {
         let is_whole = |grid| whole.is_some_and(|whole| whole.is_shown_by(grid));
-        grids.first().map_or((false, 0), |grid| (is_whole(grid), grid.len()))
+        grids.first().map_or(0, |grid| grid.len() + if is_whole(grid) { FALSE_CORNERS } else { 0 })
     };
     for level in (1..pyramid.levels().len()).rev() {
         // The finest level takes most of the time. On the next one, the tiles of its boards have half as many pixels, and

@@ -54,8 +54,9 @@ pub struct Args {
     /// none
     #[arg(long)]
     stream: bool,
-    /// The images are successive frames of a video, in this order: follow the targets from frame to frame, several times
-    /// as fast as detection. Tags in the result are those that were read again
+    /// The images are successive frames of a video, as listed or sorted by name: follow the targets from frame to frame,
+    /// one frame at a time, in a third of the time of detection (without decoding). The result contains only the tags
+    /// that were read in this frame
     #[arg(long, conflicts_with = "jobs")]
     track: bool,
     /// Accept incomplete JPEG files and note the damage in the result; otherwise they are errors

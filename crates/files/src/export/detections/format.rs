@@ -46,7 +46,7 @@ pub const DETECTION_FORMATS: &[DetectionFormat] = &[
     },
     DetectionFormat {
         name: "parquet",
-        help: "corners.parquet and pictures.parquet, with a row for each corner and for each image of the run; `calibrate` \
+        help: "corners.parquet and images.parquet, with a row for each corner and for each image of the run; `calibrate` \
                and `rig` read them",
         kind: Kind::own_parquet,
         text: None,
