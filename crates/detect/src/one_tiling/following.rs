@@ -54,6 +54,10 @@ const AGREES_PX: f64 = 0.75;
 /// Maximum change of the noise under the same optics, as a ratio. The median over a hundred corners scatters by 2 %.
 const MAX_NOISE_RATIO: f64 = 1.1;
 
+/// Maximum ratio of the standard deviation of a corner to that in the last image. Beyond, its edges were fitted instead of
+/// the corner.
+const MAX_SIGMA_RATIO: f64 = 4.0;
+
 /// Number of tags that confirm the labels of a grid. Each alone is evidence enough in a usual family.
 const TAGS: usize = 5;
 
@@ -157,10 +161,12 @@ impl OneTiling {
         let (refined, is_steady) = self.refine_moved(frame, &mut grids, track);
         timing.lap("refine");
         // Where the model fails, something has changed, or the prediction was wrong.
-        let is_kept = |(grid, count): (&Grid, &usize)| {
-            grid.corners.len() == *count && grid.corners.iter().all(|corner| corner.cov.is_some())
+        let is_kept = |((grid, count), tracked): ((&Grid, &usize), &TrackedGrid)| {
+            grid.corners.len() == *count
+                && grid.corners.iter().all(|corner| tracked.is_as_certain(corner))
         };
-        let is_lost = !grids.iter().zip(&counts).all(is_kept) || refined.are_waves.contains(&true);
+        let is_lost = !grids.iter().zip(&counts).zip(&track.grids).all(is_kept)
+            || refined.are_waves.contains(&true);
         if is_lost || !grids.iter_mut().all(|grid| self.confirm(frame.image, grid, track.age)) {
             return None;
         }
@@ -328,6 +334,16 @@ impl TrackedGrid {
             beyond += usize::from(is_new);
         }
         beyond >= BEYOND
+    }
+
+    /// Returns whether a corner has a covariance that is not much larger than in the last image.
+    fn is_as_certain(&self, corner: &GridCorner) -> bool {
+        let size = |cov: [f64; 3]| cov[0] + cov[2];
+        let place = |c: &GridCorner| (c.row, c.col).cmp(&(corner.row, corner.col));
+        let last = self.grid.corners.binary_search_by(place).ok();
+        let last = last.and_then(|index| self.grid.corners[index].cov).map(size);
+        let most = last.map_or(f64::INFINITY, |last| MAX_SIGMA_RATIO * MAX_SIGMA_RATIO * last);
+        corner.cov.is_some_and(|cov| size(cov) <= most)
     }
 
     /// Returns the grid with its corners where they are if they have moved like before.
