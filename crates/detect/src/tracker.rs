@@ -7,7 +7,7 @@ use super::one_tiling::{Frame, Search};
 use deltille_core::detection::Detection;
 use deltille_core::raster::{ImageView, Pyramid};
 
-/// Detects targets in successive images of a video, in a third of the time that single images take.
+/// Detects targets in successive images of a video, in less than half of the time that single images take.
 ///
 /// The corners are predicted from the last images, and refined there. Some of the tags, or the outline of an untagged
 /// board, have to confirm their labels with the evidence that [`Detector`] requires. An image is searched like a single one

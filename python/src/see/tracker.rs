@@ -12,7 +12,8 @@ use crate::boundary::image::Picture;
 use crate::targets::target::Target;
 use deltille::limits::Limits;
 
-/// Detects targets in successive images of a video, in a third of the time that :class:`Detector` takes for single images.
+/// Detects targets in successive images of a video, in less than half of the time that :class:`Detector`
+/// takes for single images.
 ///
 /// Corners are predicted from the last images. Some of the tags, or the outline of an untagged board, have to confirm the
 /// labels; otherwise the image is searched. :attr:`Grid.tags` contains only the tags that were read in the image.

@@ -55,7 +55,7 @@ pub struct Args {
     #[arg(long)]
     stream: bool,
     /// The images are successive frames of a video, as listed or sorted by name: follow the targets from frame to frame,
-    /// one frame at a time, in a third of the time of detection (without decoding). The result contains only the tags
+    /// one frame at a time, in less than half of the time of detection (without decoding). The result contains only the tags
     /// that were read in this frame
     #[arg(long, conflicts_with = "jobs")]
     track: bool,
