@@ -135,6 +135,23 @@ fn whole_boards_are_labelled_from_their_dark_corner_up_to_60_degrees() {
     }
 }
 
+/// A board of 6 × 9 corners is not one of 6 × 8, however clearly its last column is seen.
+#[test]
+fn larger_boards_are_not_labelled() {
+    let camera = Camera::pinhole(1024, 768, 0.9);
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    for seed in 0..12 {
+        let pose = seen_from(&mut rng, 480.0, 0.1);
+        let light = Light::default().noise(0.01).seed(seed);
+        let image = board(false).render(&camera, &pose, &light);
+        for size in [(6, 8), (5, 9)] {
+            let found = detect(&image, GridKind::Checker, Some(size));
+            assert!(found.grids.is_empty(), "{seed}: {size:?}: {:?}", found.grids);
+        }
+        assert_eq!(detect(&image, GridKind::Checker, Some((6, 9))).grids.len(), 1, "{seed}");
+    }
+}
+
 #[test]
 fn a_fisheye_lens_bends_the_rows_but_not_the_labels() {
     let mut camera = Camera::pinhole(1600, 1200, 1.2);
