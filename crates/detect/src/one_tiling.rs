@@ -408,7 +408,8 @@ impl OneTiling {
         grids: &Judged,
     ) -> Vec<f64> {
         let whole = self.labels.whole().map_or(usize::MAX, |whole| whole.corners());
-        let is_whole = |(grid, _): &(Grid, _)| is_labelled(grid) && grid.corners.len() >= whole;
+        let is_whole =
+            |found: &(Grid, _)| self.is_identified(found) && found.0.corners.len() >= whole;
         match found.first() {
             _ if grids.iter().any(is_whole) => Vec::new(),
             Some(largest) if !grids.is_empty() => {

@@ -16,6 +16,7 @@ use crate::grid::saddle_grid::{PlacedSaddle, SaddleGrid};
 use crate::labels::grid_labels::FoundGrid;
 use crate::labels::placement::labeller::Budget;
 use crate::refine::clearance::Prediction;
+use crate::refine::edge_shift::positions;
 use crate::refine::model::fitter::CornerFitter;
 use crate::refine::optics::Optics;
 use crate::timing::Timing;
@@ -236,11 +237,7 @@ impl OneTiling {
     /// Returns whether some tags of a grid, or its outline, confirm its labels. Replaces its tags by those that were read.
     fn confirm(&self, image: ImageView, grid: &mut Grid, number: usize) -> bool {
         let Some(panel) = self.labels.panel_of(grid) else { return false };
-        let known: BTreeMap<Vertex, DVec2> = grid
-            .corners
-            .iter()
-            .map(|corner| (Vertex::new(corner.row, corner.col), corner.position()))
-            .collect();
+        let known = positions(grid);
         let tiles: Vec<_> = panel
             .tagged
             .iter()
@@ -285,11 +282,10 @@ impl OneTiling {
     /// Returns the vertices next to a grid, on its panel or beyond, that are predicted in the image.
     fn beside(&self, image: ImageView, grid: &Grid) -> BTreeMap<Vertex, Beside> {
         let Some(panel) = self.labels.panel_of(grid) else { return BTreeMap::new() };
-        let vertex = |corner: &GridCorner| Vertex::new(corner.row, corner.col);
-        let known: BTreeSet<Vertex> = grid.corners.iter().map(vertex).collect();
-        let neighbours = known.iter().flat_map(|&vertex| grid.kind.neighbours(vertex));
+        let known = positions(grid);
+        let neighbours = known.keys().flat_map(|&vertex| grid.kind.neighbours(vertex));
         let missing: BTreeSet<Vertex> =
-            neighbours.filter(|vertex| !known.contains(vertex)).collect();
+            neighbours.filter(|vertex| !known.contains_key(vertex)).collect();
         let predicted = Prediction::from(grid);
         let look = |vertex: Vertex| {
             let (place, sd_px) = predicted.at(vertex).filter(|(at, _)| is_inside(image, *at))?;
@@ -309,14 +305,9 @@ impl TrackedGrid {
             (tracked.grid.panel, &tracked.grid.target) == (grid.panel, &grid.target)
         };
         let last = before.and_then(|track| track.grids.iter().find(same));
-        let last = last.into_iter().flat_map(|tracked| &tracked.grid.corners);
-        let last: BTreeMap<Vertex, DVec2> =
-            last.map(|c| (Vertex::new(c.row, c.col), c.position())).collect();
-        let step = |corner: &GridCorner| {
-            let vertex = Vertex::new(corner.row, corner.col);
-            Some((vertex, corner.position() - *last.get(&vertex)?))
-        };
-        let steps = grid.corners.iter().filter_map(step).collect();
+        let last = last.map(|tracked| positions(&tracked.grid)).unwrap_or_default();
+        let step = |(vertex, place): (Vertex, DVec2)| Some((vertex, place - *last.get(&vertex)?));
+        let steps = positions(grid).into_iter().filter_map(step).collect();
         Self { grid: grid.clone(), steps, beside: BTreeMap::new() }
     }
 
@@ -409,8 +400,7 @@ fn is_about(noise: f64, other: f64) -> bool {
 
 /// Returns the shortest distance of neighbours in a grid, px.
 fn shortest_edge_px(grid: &Grid) -> f64 {
-    let places: BTreeMap<Vertex, DVec2> =
-        grid.corners.iter().map(|c| (Vertex::new(c.row, c.col), c.position())).collect();
+    let places = positions(grid);
     let edges = places.iter().flat_map(|(&vertex, place)| {
         let next = grid.kind.neighbours(vertex);
         next.filter_map(|next| Some(places.get(&next)?.distance(*place))).collect::<Vec<_>>()

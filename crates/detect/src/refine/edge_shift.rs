@@ -146,7 +146,8 @@ struct Edge {
     across_rad: f64,
 }
 
-fn positions(grid: &Grid) -> BTreeMap<Vertex, DVec2> {
+/// Returns the corners of a grid by their vertices.
+pub(crate) fn positions(grid: &Grid) -> BTreeMap<Vertex, DVec2> {
     let corners = grid.corners.iter();
     corners.map(|corner| (Vertex::new(corner.row, corner.col), corner.position())).collect()
 }

@@ -73,12 +73,12 @@ pub struct Args {
 }
 
 /// Detects targets in single images, or in those of a video.
-struct Eye {
+struct ImageDetector {
     detector: Detector,
     tracker: Option<Mutex<Tracker>>,
 }
 
-impl Eye {
+impl ImageDetector {
     fn of(args: &Args, detector: Detector) -> Self {
         let tracker = args.track.then(|| Mutex::new(Tracker::new(detector.clone())));
         Self { detector, tracker }
@@ -129,7 +129,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         bail!("--format {name} does not support several targets; use one --target at a time");
     }
     let detector = if args.timing { detector.with_clock(clock::now) } else { detector };
-    let eye = Eye::of(&args, detector);
+    let finder = ImageDetector::of(&args, detector);
     let images = Images::of(&args.images)?;
     // Detects name clashes among the named images before the work starts.
     let mut named = Stems::default();
@@ -198,7 +198,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             {
                 return Ok(Outcome::Skipped);
             }
-            let found = one_image(&args, &targets, &eye, &image, &stem)?;
+            let found = one_image(&args, &targets, &finder, &image, &stem)?;
             let looked_at = Seen { index, image, stem, ink: found.ink };
             seen.lock().expect("no thread panics here").push(looked_at);
             Ok(Outcome::Seen(Box::new(found)))
@@ -219,10 +219,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     seen.sort_unstable_by_key(|seen| seen.index);
     let mut again = None;
     if args.stream {
-        note_ink_of_all(&eye.detector, &seen);
+        note_ink_of_all(&finder.detector, &seen);
     } else if !interrupt::is_raised() {
         let unseen = unseen.into_inner().expect("no thread panics here");
-        again = see_again(&args, &targets, &eye.detector, &seen, unseen, &threads, &report)?;
+        again = see_again(&args, &targets, &finder.detector, &seen, unseen, &threads, &report)?;
     }
     if let Some(tables) = tables {
         let is_left = interrupt::is_raised();
@@ -272,7 +272,7 @@ fn see_again(
     let Some(ink) = InkEstimate::of_all(&known).filter(|ink| ink.used) else { return Ok(None) };
     let mut tables = None;
     if let Some(detector) = detector.with_ink_of(&found) {
-        let eye = Eye::of(args, detector);
+        let finder = ImageDetector::of(args, detector);
         let bar = progress::bar(seen.len() as u64, "images, second pass with joint ink estimate");
         let images = seen.iter().map(|seen| Ok(seen.image.clone()));
         tables = args.tables().map(|folder| Tables::begin(folder, targets)).transpose()?;
@@ -284,7 +284,7 @@ fn see_again(
                 return;
             }
             let Seen { index, image, stem, .. } = &seen[index];
-            let again = one_image(args, targets, &eye, image, stem);
+            let again = one_image(args, targets, &finder, image, stem);
             again.as_ref().err().iter().for_each(|error| bar.suspend(|| report.fail_again(error)));
             if let Some(tables) = &tables {
                 tables.add(
@@ -452,14 +452,14 @@ impl Args {
 fn one_image(
     args: &Args,
     targets: &[Target],
-    eye: &Eye,
+    finder: &ImageDetector,
     path: &Path,
     stem: &str,
 ) -> anyhow::Result<Found> {
     let limits = args.finder.limits();
     let Photograph { image, notes } =
         photograph::read_with_notes(path, &limits, args.accept_damaged)?;
-    let mut found = eye.detect(&image, &name_of(path));
+    let mut found = finder.detect(&image, &name_of(path));
     found.file = notes;
     if let Some(folder) = args.folder() {
         let path = |extension: &str| folder.join(format!("{stem}.{extension}"));
