@@ -5,14 +5,15 @@ mod refining;
 
 use std::collections::BTreeMap;
 
+use glam::DVec2;
+
 use super::config::DetectorConfig;
 use super::nothing_seen::nothing_found;
 use super::tiling::{CHECKER, DELTILLE, kind, step};
 use super::timing::Timing;
 use crate::corners::ring;
-use crate::corners::saddles::{Saddle, SaddleFinder, too_many};
+use crate::corners::saddles::{SaddleFinder, too_many};
 use crate::grid::grids::grids;
-use crate::grid::links::link::has_chain;
 use crate::grid::saddle_grid::{PlacedSaddle, SaddleGrid};
 use crate::grid::untagged::beyond::go_on;
 use crate::grid::untagged::tile_shape::{LARGE_INK, is_of_squares};
@@ -24,9 +25,7 @@ use crate::refine::model::fitter::CornerFitter;
 use crate::refine::optics::Optics;
 use crate::refine::refiner::Refiner;
 use crate::transformed::enlarged::enlarged_grids;
-use crate::transformed::foreshortened::{
-    all_directions, foreshortened_direction, foreshortened_grids,
-};
+use crate::transformed::foreshortened::{Direction, foreshortened_direction, foreshortened_grids};
 use crate::transformed::moved_edges::grids_of_moved_edges;
 use deltille_core::Clock;
 use deltille_core::detection::{
@@ -50,6 +49,10 @@ const MIN_COARSE_EDGE_PX: f64 = 7.0;
 
 /// Radius of the polynomial refinement, px, as in the reference detector.
 const POLYNOMIAL_RADIUS: usize = 3;
+
+/// Number of times that a grid has as many corners as the target if it shows something else, not the target with false
+/// corners beyond its border.
+const LARGER: usize = 2;
 
 /// Micrometres per millimetre.
 const UM_IN_MM: f64 = 1e3;
@@ -322,25 +325,28 @@ impl OneTiling {
         let of_found = left_out.len();
         timing.lap("labels");
         let is_worth = how == Search::Thorough || !grids.is_empty();
-        let may_show_board = is_worth
-            && self.labels.are_wanted()
-            && (!grids.is_empty() || self.may_show_board(pyramid, &saddles));
-        if may_show_board && self.may_lack_corners(&grids) {
-            let found = enlarged_grids(finder, image, pyramid, self.labels.whole());
+        let is_worth = is_worth && self.is_sought();
+        let is_other = |grid: &&SaddleGrid| grid.len() > LARGER * self.labels.most_corners();
+        let others = found.iter().filter(is_other).flat_map(|grid| grid.values());
+        let others: Vec<DVec2> = others.map(|placed| placed.position).collect();
+        if is_worth && self.may_lack_corners(&grids) {
+            let found = enlarged_grids(finder, image, pyramid, self.labels.whole(), &others);
             let found = self.plausible::<N>(frame, &found, &mut Vec::new());
-            grids = with_larger_panels(grids, found);
+            grids = self.with_larger_panels(grids, found);
             timing.lap("enlarged");
         }
-        let directions = self.foreshortened_directions::<N>(&found, &grids);
-        if may_show_board && !directions.is_empty() {
-            let foreshortened = foreshortened_grids(finder, pyramid, &directions);
+        if let Some(direction) = self.foreshortened_direction::<N>(&found, &grids)
+            && is_worth
+        {
+            let foreshortened = foreshortened_grids(finder, pyramid, direction, &others);
             // Foreshortened patterns of all kinds contain triangles and squares too.
             let left_out = if grids.is_empty() { &mut left_out } else { &mut Vec::new() };
-            grids = with_larger_panels(grids, self.plausible::<N>(frame, &foreshortened, left_out));
+            let foreshortened = self.plausible::<N>(frame, &foreshortened, left_out);
+            grids = self.with_larger_panels(grids, foreshortened);
             timing.lap("foreshortened");
         }
-        if is_worth && self.is_sought() && !grids.iter().any(|found| self.is_identified(found)) {
-            let found = grids_of_moved_edges(finder, pyramid, self.labels.whole());
+        if is_worth && !grids.iter().any(|found| self.is_identified(found)) {
+            let found = grids_of_moved_edges(finder, pyramid, self.labels.whole(), &others);
             let mut identified = self.plausible::<N>(frame, &found, &mut Vec::new());
             identified.iter_mut().for_each(|(grid, _)| centre(frame.image, grid, MAX_SHIFT));
             // Dots look like squares whose edges have moved.
@@ -393,29 +399,22 @@ impl OneTiling {
         }
     }
 
-    /// Returns whether an image without a grid may show a part of the target, as far as corners without a tag beside them
-    /// tell: however small or foreshortened it is, some of them are found and joined.
-    fn may_show_board<const N: usize>(&self, pyramid: &Pyramid, saddles: &[Saddle<N>]) -> bool {
-        !self.tag_areas.leave_corners_clear()
-            || !too_many(pyramid, saddles.len()) && has_chain(pyramid, saddles)
-    }
-
-    /// Returns the directions in which tiles may be seen that are missing because they are foreshortened, radians: that of
-    /// the largest grid if it is foreshortened and not whole, and all if there is no grid.
-    fn foreshortened_directions<const N: usize>(
+    /// Returns the direction in which tiles may be long that are missing because they are foreshortened: that of the largest
+    /// grid if it is foreshortened and not whole, and that of parallel edges if there is no grid.
+    fn foreshortened_direction<const N: usize>(
         &self,
         found: &[SaddleGrid],
         grids: &Judged,
-    ) -> Vec<f64> {
+    ) -> Option<Direction> {
         let whole = self.labels.whole().map_or(usize::MAX, |whole| whole.corners());
         let is_whole =
             |found: &(Grid, _)| self.is_identified(found) && found.0.corners.len() >= whole;
         match found.first() {
-            _ if grids.iter().any(is_whole) => Vec::new(),
+            _ if grids.iter().any(is_whole) => None,
             Some(largest) if !grids.is_empty() => {
-                foreshortened_direction::<N>(largest).into_iter().collect()
+                foreshortened_direction::<N>(largest).map(Direction::Known)
             }
-            _ => all_directions(),
+            _ => Some(Direction::OfEdges),
         }
     }
 
@@ -524,6 +523,29 @@ impl OneTiling {
         is_labelled(grid) || self.is_sought() && no_labels.is_none()
     }
 
+    /// Returns for each panel its grids from the list that shows more of its corners. Unidentified grids are only kept if no
+    /// panel has gained corners, because they may show parts of those that have.
+    fn with_larger_panels(&self, grids: Judged, mut others: Judged) -> Judged {
+        let panel = |grid: &Grid| (grid.target.clone(), grid.panel);
+        let corners = |grids: &Judged| {
+            let mut corners = BTreeMap::new();
+            for (grid, _) in grids.iter().filter(|found| self.is_identified(found)) {
+                *corners.entry(panel(grid)).or_insert(0) += grid.corners.len();
+            }
+            corners
+        };
+        let (before, after) = (corners(&grids), corners(&others));
+        let has_gained = |grid: &Grid| after.get(&panel(grid)) > before.get(&panel(grid));
+        others.retain(|found| self.is_identified(found) && has_gained(&found.0));
+        if others.is_empty() {
+            return grids;
+        }
+        let kept = grids.into_iter();
+        others.extend(kept.filter(|found| self.is_identified(found) && !has_gained(&found.0)));
+        sort_by_panel(&mut others);
+        others
+    }
+
     /// Removes unconfirmed grids whose pattern continues beyond their border.
     fn refuse_patterns(&self, pyramid: &Pyramid, grids: &mut Judged) {
         loop {
@@ -578,29 +600,6 @@ fn sort_by_panel(grids: &mut Judged) {
     grids.sort_by_cached_key(|(grid, _)| {
         (grid.panel.is_none(), grid.target.clone(), grid.panel.unwrap_or(u32::MAX))
     });
-}
-
-/// Returns for each panel its grids from the list that shows more of its corners. Unlabelled grids are only kept if no
-/// panel has gained corners, because they may show parts of those that have.
-fn with_larger_panels(grids: Judged, mut others: Judged) -> Judged {
-    let panel = |grid: &Grid| (grid.target.clone(), grid.panel);
-    let corners = |grids: &Judged| {
-        let mut corners = BTreeMap::new();
-        for (grid, _) in grids.iter().filter(|(grid, _)| is_labelled(grid)) {
-            *corners.entry(panel(grid)).or_insert(0) += grid.corners.len();
-        }
-        corners
-    };
-    let (before, after) = (corners(&grids), corners(&others));
-    let has_gained = |grid: &Grid| after.get(&panel(grid)) > before.get(&panel(grid));
-    others.retain(|(grid, _)| is_labelled(grid) && has_gained(grid));
-    if others.is_empty() {
-        return grids;
-    }
-    let kept = grids.into_iter().filter(|(grid, _)| is_labelled(grid) && !has_gained(grid));
-    others.extend(kept);
-    sort_by_panel(&mut others);
-    others
 }
 
 fn refiner(kind: GridKind, config: DetectorConfig, edge_mm: Option<f64>) -> Refiner {

@@ -86,58 +86,53 @@ impl<const N: usize> SaddleFinder<N> {
 
     /// Returns all saddles of an image, in raster order.
     pub(crate) fn find(&self, pyramid: &Pyramid) -> Vec<Saddle<N>> {
-        let (mut noise, mut is_all_noise) = (0.0f32, true);
-        let finest = &pyramid.levels()[0];
-        let mut saddles = Merged::<N>::new(finest.width(), finest.height());
-        for (n, level) in pyramid.levels().iter().enumerate() {
-            let sampled = sample_noise(level);
-            // Averaging does not remove grain that neighbouring pixels share.
-            noise = noise.max(HARMONIC_NOISE * sampled.sigma);
-            is_all_noise &= sampled.is_all;
-            let candidates = if is_all_noise && NOISE_FACTOR * noise > MIN_AMPLITUDE {
-                candidates::<N>(level, NOISE_FACTOR * noise)
-            } else {
-                candidates_above_noise::<N>(level, NOISE_FACTOR * noise)
-            };
-            for candidate in candidates {
-                let start = DVec2::new(candidate.x as f64, candidate.y as f64);
-                // A candidate on a corner of a finer level is that corner.
-                if n > 0 && saddles.is_known(Pyramid::to_level_0(n, start), n) {
-                    continue;
-                }
-                let fit = &self.fits[USUAL];
-                let Some(on_level) = fit.find(level.into(), start) else {
-                    continue;
-                };
-                let place = Pyramid::to_level_0(n, on_level.position);
-                if !saddles.is_free(place, n) {
-                    continue;
-                }
-                let is_stable = self.is_stable(level, on_level.position, USUAL);
-                if n == 0 && !is_stable && kind::<N>() == GridKind::Deltille {
-                    // No narrower fit is tried.
-                    continue;
-                }
-                let Some(sectors) = Sectors::read(level, on_level.position, &on_level.form) else {
-                    continue;
-                };
-                let described = Saddle { position: place, sectors, level: n };
-                let saddle = match n {
-                    0 if is_stable => Some(described),
-                    0 => self.narrow(pyramid, start),
-                    _ => self.sharpest(pyramid, described, is_stable),
-                };
-                if let Some(saddle) = saddle {
-                    saddles.add(saddle, is_blurred::<N>(pyramid, saddle.level, saddle.position));
-                }
+        self.find_in(pyramid, 0.0)
+    }
+
+    /// Returns all saddles of an image whose samples have at least the noise `sigma`, in raster order.
+    pub(crate) fn find_in(&self, pyramid: &Pyramid, sigma: f32) -> Vec<Saddle<N>> {
+        let mut noise = Noise::at_least(sigma);
+        let mut saddles = Merged::of(pyramid);
+        for n in 0..pyramid.levels().len() {
+            for candidate in noise.candidates::<N>(&pyramid.levels()[n]) {
+                self.add(pyramid, n, candidate, &mut saddles);
             }
         }
-        let mut all = saddles.all();
-        all.sort_by(|a, b| {
-            let key = |s: &Saddle<N>| [s.position.y, s.position.x];
-            key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
-        });
-        all
+        saddles.sorted()
+    }
+
+    /// Adds the saddle that the fit reaches from a candidate on level `n`, if there is one that is not known yet.
+    fn add(&self, pyramid: &Pyramid, n: usize, candidate: Candidate, saddles: &mut Merged<N>) {
+        let level = &pyramid.levels()[n];
+        let start = DVec2::new(candidate.x as f64, candidate.y as f64);
+        // A candidate on a corner of a finer level is that corner.
+        if n > 0 && saddles.is_known(Pyramid::to_level_0(n, start), n) {
+            return;
+        }
+        let Some(on_level) = self.fits[USUAL].find(level.into(), start) else {
+            return;
+        };
+        let place = Pyramid::to_level_0(n, on_level.position);
+        if !saddles.is_free(place, n) {
+            return;
+        }
+        let is_stable = self.is_stable(level, on_level.position, USUAL);
+        if n == 0 && !is_stable && kind::<N>() == GridKind::Deltille {
+            // No narrower fit is tried.
+            return;
+        }
+        let Some(sectors) = Sectors::read(level, on_level.position, &on_level.form) else {
+            return;
+        };
+        let described = Saddle { position: place, sectors, level: n };
+        let saddle = match n {
+            0 if is_stable => Some(described),
+            0 => self.narrow(pyramid, start),
+            _ => self.sharpest(pyramid, described, is_stable),
+        };
+        if let Some(saddle) = saddle {
+            saddles.add(saddle, is_blurred::<N>(pyramid, saddle.level, saddle.position));
+        }
     }
 
     /// Follows a corner from a coarse level to finer ones as long as these show it sharply. If a
@@ -254,6 +249,35 @@ impl<const N: usize> SaddleFinder<N> {
     }
 }
 
+/// Noise of the harmonic on the levels of an image, finest first.
+struct Noise {
+    /// Standard deviation.
+    sigma: f32,
+    /// Whether all levels so far show only noise.
+    is_all: bool,
+}
+
+impl Noise {
+    /// Returns the noise of an image whose samples have at least the noise `sigma`.
+    fn at_least(sigma: f32) -> Self {
+        Self { sigma: HARMONIC_NOISE * sigma, is_all: true }
+    }
+
+    /// Returns the candidates on the next level.
+    fn candidates<const N: usize>(&mut self, level: &Gray<i16>) -> Vec<Candidate> {
+        let sampled = sample_noise(level);
+        // Averaging does not remove grain that neighbouring pixels share.
+        self.sigma = self.sigma.max(HARMONIC_NOISE * sampled.sigma);
+        self.is_all &= sampled.is_all;
+        let least = NOISE_FACTOR * self.sigma;
+        if self.is_all && least > MIN_AMPLITUDE {
+            candidates::<N>(level, least)
+        } else {
+            candidates_above_noise::<N>(level, least)
+        }
+    }
+}
+
 /// Returns the candidates on a level whose harmonic reaches `noise`, or a quarter of that of the ninth strongest if
 /// this is less. If a board fills the image, no plain part is left to measure the noise, but then there are at least as
 /// many corners as in a grid. (In an image of noise alone, the noise can be measured.)
@@ -337,9 +361,11 @@ pub(crate) fn merge_px(level: usize) -> f64 {
 }
 
 impl<const N: usize> Merged<N> {
-    /// Creates an empty set for an image of this size.
-    fn new(width: usize, height: usize) -> Self {
-        Self { all: Vec::new(), blurred: Vec::new(), places: Buckets::new(width, height) }
+    /// Creates an empty set for an image.
+    fn of(pyramid: &Pyramid) -> Self {
+        let finest = &pyramid.levels()[0];
+        let places = Buckets::new(finest.width(), finest.height());
+        Self { all: Vec::new(), blurred: Vec::new(), places }
     }
 
     /// Returns the saddles within the merging distance of a level, px.
@@ -372,24 +398,25 @@ impl<const N: usize> Merged<N> {
         self.blurred.push(blurred);
     }
 
-    fn all(self) -> Vec<Saddle<N>> {
-        self.all.into_iter().flatten().collect()
+    /// Returns all saddles in raster order.
+    fn sorted(self) -> Vec<Saddle<N>> {
+        let mut all: Vec<Saddle<N>> = self.all.into_iter().flatten().collect();
+        all.sort_by(|a, b| {
+            let key = |s: &Saddle<N>| [s.position.y, s.position.x];
+            key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
+        });
+        all
     }
-}
-
-/// Returns whether an image shows only noise.
-pub(crate) fn is_all_noise(image: &Gray<i16>) -> bool {
-    sample_noise(image).is_all
 }
 
 /// Noise of the samples of a ring away from corners.
 #[derive(Clone, Copy, Debug)]
-struct SampleNoise {
+pub(crate) struct SampleNoise {
     /// Standard deviation, on a scale of 0 to 1023.
-    sigma: f32,
+    pub sigma: f32,
     /// Whether the image contains only noise. Then the strength of the noise is known, however
     /// large it is.
-    is_all: bool,
+    pub is_all: bool,
 }
 
 /// Measures the noise of a sample of the ring: noise, and grain that neighbouring pixels share because demosaicing or
@@ -398,7 +425,7 @@ struct SampleNoise {
 /// The measure is |Laplacian| over a sparse raster, with the mask of Immerkær, "Fast noise variance estimation" (1996).
 /// The mask vanishes on planes and weakly curved surfaces. It is enlarged so that its nine samples are as far apart as
 /// those of the ring.
-fn sample_noise(image: &Gray<i16>) -> SampleNoise {
+pub(crate) fn sample_noise(image: &Gray<i16>) -> SampleNoise {
     /// Number of samples that suffices to determine the quiet quantile to 3 %.
     const PLENTY: usize = 8000;
     /// Minimum distance between samples, px: the nine samples of the mask are 8 px wide.

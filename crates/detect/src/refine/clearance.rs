@@ -46,8 +46,6 @@ struct Insets {
 struct TagsOfPanel {
     tiles: BTreeSet<Tile>,
     insets: Insets,
-    /// Whether most corners have no tag beside them.
-    leave_corners_clear: bool,
 }
 
 /// The tiles of targets with tags, and the area of the tag in its tile.
@@ -69,11 +67,7 @@ impl TagAreas {
                 TagsIn::White => panel.tag_margin_bits() / width,
             };
             let tiles: BTreeSet<Tile> = panel.tags.iter().map(|tag| panel.tag_tile(tag)).collect();
-            let beside: BTreeSet<Vertex> = tiles.iter().flat_map(|tile| tile.vertices()).collect();
-            let clear =
-                panel.corners.iter().filter(|c| !beside.contains(&Vertex::new(c.row, c.col)));
-            let leave_corners_clear = 2 * clear.count() > panel.corners.len();
-            (panel.id, TagsOfPanel { tiles, insets: Insets { tag, cells }, leave_corners_clear })
+            (panel.id, TagsOfPanel { tiles, insets: Insets { tag, cells } })
         };
         Self { targets: vec![(None, tagged.map(tags).collect())] }
     }
@@ -90,12 +84,6 @@ impl TagAreas {
     /// Returns whether no tile shows a tag.
     pub(crate) fn is_empty(&self) -> bool {
         self.targets.iter().all(|(_, panels)| panels.is_empty())
-    }
-
-    /// Returns whether most corners of every tagged panel have no tag beside them.
-    pub(crate) fn leave_corners_clear(&self) -> bool {
-        let mut panels = self.targets.iter().flat_map(|(_, panels)| panels.values());
-        panels.all(|panel| panel.leave_corners_clear)
     }
 
     /// Returns the distances from the edges of dark and bright tiles to their tags, in edge lengths; infinite without
@@ -573,7 +561,7 @@ mod tests {
             DVec2::new(100.0 + 40.0 * place.x, 300.0 - 40.0 * place.y)
         });
         let insets = Insets { tag: 0.25, cells: 0.25 };
-        let panel = TagsOfPanel { tiles: BTreeSet::new(), insets, leave_corners_clear: true };
+        let panel = TagsOfPanel { tiles: BTreeSet::new(), insets };
         let tags = TagAreas { targets: vec![(None, BTreeMap::from([(0, panel)]))] };
         let around = &surroundings(&grid, &tags, 1.0)[12];
         // Cells begin 10 px from both edges; the blur reaches 2 px.

@@ -16,15 +16,16 @@ use glam::DVec2;
 use nalgebra::{Matrix2, SymmetricEigen, Vector2};
 use rayon::prelude::*;
 
-use crate::corners::saddles::{SaddleFinder, is_all_noise};
+use super::regions::{Blocks, Region};
+use crate::corners::saddles::{SaddleFinder, sample_noise};
 use crate::grid::grids::grids;
 use crate::grid::saddle_grid::SaddleGrid;
 use crate::levels::MIN_LEVEL_SIDE;
 use crate::tiling::step;
 use deltille_core::raster::{Gray, Pyramid};
 
-/// Number of directions in 180° if that of the tiles is unknown. No direction is more than 11° from one of them. At 11°,
-/// a third of the width changes tiles from an aspect ratio of 4 to one of 2.2.
+/// Number of directions in 180° if that of the tiles is only known from their edges. No direction is more than 11° from
+/// one of them. At 11°, a third of the width changes tiles from an aspect ratio of 4 to one of 2.2.
 const DIRECTIONS: usize = 8;
 
 /// Factor of the compressed width.
@@ -46,9 +47,16 @@ const LEVEL_STEP: f64 = 1e-9;
 /// Value outside the image, on a scale of 0 to 1023: neither dark nor bright.
 const OUTSIDE: i16 = 512;
 
-/// Returns all directions of tiles that are tried if none is known, radians.
-pub(crate) fn all_directions() -> Vec<f64> {
-    (0..DIRECTIONS).map(|i| PI * i as f64 / DIRECTIONS as f64).collect()
+/// Number of pixels of a view that are drawn together, or not at all.
+const RUN: usize = 8;
+
+/// The direction in which tiles are long.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Direction {
+    /// That of a grid, radians.
+    Known(f64),
+    /// That of the edges, wherever they are parallel.
+    OfEdges,
 }
 
 /// Returns the direction in which the tiles of a grid are long, radians, if they are foreshortened.
@@ -71,52 +79,76 @@ pub(crate) fn foreshortened_direction<const N: usize>(grid: &SaddleGrid) -> Opti
 pub(crate) fn foreshortened_grids<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
-    directions: &[f64],
+    direction: Direction,
+    others: &[DVec2],
 ) -> Vec<SaddleGrid> {
     let levels = pyramid.levels();
     let fitting = levels.iter().position(|level| level.pixels().len() <= MAX_PIXELS);
     let level = fitting.unwrap_or(levels.len() - 1);
     let is_small = levels[level].width().min(levels[level].height()) < MIN_LEVEL_SIDE;
-    if is_small || is_all_noise(&levels[level]) {
+    let noise = sample_noise(&levels[level]);
+    if is_small || noise.is_all {
         return Vec::new();
     }
-    let views = directions.par_iter().map(|&angle| {
-        let view = View::new(&levels[level], angle);
+    let directions = match direction {
+        Direction::Known(angle) => vec![(angle, vec![Region::whole(&levels[level])])],
+        Direction::OfEdges => {
+            let regions = Blocks::of(pyramid, level, others).parallel_edges::<DIRECTIONS>();
+            let angle = |i: usize| PI * i as f64 / DIRECTIONS as f64;
+            regions.into_iter().enumerate().map(|(i, regions)| (angle(i), regions)).collect()
+        }
+    };
+    let seen = |angle: f64, region: &Region| -> Vec<SaddleGrid> {
+        let view = View::new(&levels[level], angle, region);
         let drawn = view.drawn(&levels[level]);
         let compressed = Pyramid::new(&drawn, levels.len() - level, MIN_LEVEL_SIDE);
-        let saddles = finder.find(&compressed);
+        let saddles = finder.find_in(&compressed, noise.sigma);
         let mut found = grids(finder, &compressed, &saddles, None);
         for placed in found.iter_mut().flat_map(|grid| grid.values_mut()) {
             placed.position = Pyramid::to_level_0(level, view.in_picture(placed.position));
         }
         found
+    };
+    let of_directions = directions.par_iter().map(|(angle, regions)| {
+        let mut grids: Vec<SaddleGrid> =
+            regions.iter().flat_map(|region| seen(*angle, region)).collect();
+        grids.sort_by_key(|grid| std::cmp::Reverse(grid.len()));
+        grids
     });
     let size = |grids: &Vec<SaddleGrid>| grids.first().map_or(0, |grid| grid.len());
     // Of equally good directions, the first.
     let better = |a, b| if size(&b) > size(&a) { b } else { a };
-    views.collect::<Vec<_>>().into_iter().reduce(better).unwrap_or_default()
+    of_directions.collect::<Vec<_>>().into_iter().reduce(better).unwrap_or_default()
 }
 
-/// An image compressed in one direction.
-struct View {
+/// A region of an image, compressed in one direction.
+struct View<'a> {
     picture_from_view: Matrix2<f64>,
     /// Centre of the view, in the image and in the view.
     centres: [Vector2<f64>; 2],
     size: [usize; 2],
+    region: &'a Region,
 }
 
-impl View {
-    fn new(image: &Gray<i16>, angle: f64) -> Self {
+impl<'a> View<'a> {
+    fn new(image: &Gray<i16>, angle: f64, region: &'a Region) -> Self {
         let along = Vector2::new(angle.cos(), angle.sin());
         let view_from_picture = Matrix2::identity() - (1.0 - WIDTH) * along * along.transpose();
         let picture_from_view =
             Matrix2::identity() + (1.0 / WIDTH - 1.0) * along * along.transpose();
-        let picture = Vector2::new(image.width() as f64, image.height() as f64);
-        let view = view_from_picture.abs() * picture;
+        let [columns, rows] = region.bounds();
+        let first = Vector2::new(columns.start as f64, rows.start as f64);
+        let end = Vector2::new(
+            columns.end.min(image.width()) as f64,
+            rows.end.min(image.height()) as f64,
+        );
+        let view = view_from_picture.abs() * (end - first);
+        let half_px = Vector2::repeat(0.5);
         Self {
             picture_from_view,
-            centres: [picture, view].map(|size| (size - Vector2::repeat(1.0)) / 2.0),
+            centres: [(first + end) / 2.0 - half_px, view / 2.0 - half_px],
             size: [view.x.ceil() as usize, view.y.ceil() as usize],
+            region,
         }
     }
 
@@ -126,8 +158,8 @@ impl View {
         DVec2::new(there.x, there.y)
     }
 
-    /// Renders the image as the view shows it, with grey outside the image. (A pyramid level is
-    /// smooth enough to be sampled at every second pixel.)
+    /// Renders the region as the view shows it, with grey outside. (A pyramid level is smooth enough to be sampled at every
+    /// second pixel.)
     fn drawn(&self, image: &Gray<i16>) -> Gray<i16> {
         // The last position has a pixel behind it.
         let last = [image.width(), image.height()].map(|side| side as f64 - (2.0 + SLACK_PX));
@@ -149,8 +181,12 @@ impl View {
                 }
             }
             let (from, to) = (from.ceil(), to.floor());
-            if let Some(seen) = row.get_mut(from as usize..to as usize) {
-                sample(image, first + from * step, step, seen);
+            let seen = row.get_mut(from as usize..to as usize).unwrap_or_default();
+            for (n, run) in seen.chunks_mut(RUN).enumerate() {
+                let start = first + (from + (n * RUN) as f64) * step;
+                if self.region.contains(start + run.len() as f64 / 2.0 * step) {
+                    sample(image, start, step, run);
+                }
             }
         }
         drawn
@@ -193,8 +229,9 @@ mod tests {
             let [u, v] = [x as f64 - 120.3, y as f64 - 60.8];
             (1000.0 * (-(u * u + v * v) / 200.0).exp()) as i16
         });
-        for angle in all_directions() {
-            let view = View::new(&image, angle);
+        let region = Region::whole(&image);
+        for angle in (0..DIRECTIONS).map(|i| PI * i as f64 / DIRECTIONS as f64) {
+            let view = View::new(&image, angle, &region);
             let drawn = view.drawn(&image);
             let (mut sum, mut middle) = (0.0, DVec2::ZERO);
             for y in 0..drawn.height() {

@@ -13,11 +13,12 @@
 //!             █████           █████         █████
 //! ```
 
+use glam::DVec2;
 use rayon::prelude::*;
 
-use crate::corners::saddles::{SaddleFinder, is_all_noise};
+use super::regions::{Blocks, Region};
+use crate::corners::saddles::{SaddleFinder, sample_noise};
 use crate::grid::grids::grids;
-use crate::grid::links::link::has_chain;
 use crate::grid::outline::WholeBoard;
 use crate::grid::saddle_grid::SaddleGrid;
 use crate::levels::MIN_LEVEL_SIDE;
@@ -28,57 +29,60 @@ use deltille_core::raster::{Gray, Pyramid};
 /// A larger board exceeds it by a whole row.
 const FALSE_CORNERS: usize = 2;
 
+/// Number of views of a level: itself, and with the edges moved in and out by one and two pixels.
+const VIEWS: usize = 5;
+
 /// Returns the grids of the level and the displacement that show the whole board or the largest grid, in px of level 0.
 pub(crate) fn grids_of_moved_edges<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
     whole: Option<&WholeBoard>,
+    others: &[DVec2],
 ) -> Vec<SaddleGrid> {
-    let of_level = |level: usize| -> Vec<View> {
-        let coarse = pyramid.from_level(level);
+    let of_region = |level: usize, sigma: f32, region: &Region| -> Vec<Vec<SaddleGrid>> {
+        let first = DVec2::from(region.bounds().map(|side| side.start as f64));
         let seen = |image: &Gray<i16>| {
             // Its first level is blurred, so that gaps of a pixel close.
-            let blurred = Pyramid::new(image, coarse.levels().len(), MIN_LEVEL_SIDE);
-            let saddles = finder.find(&blurred);
+            let blurred = Pyramid::new(image, pyramid.levels().len() - level, MIN_LEVEL_SIDE);
+            let saddles = finder.find_in(&blurred, sigma);
             let mut grids = grids(finder, &blurred, &saddles, whole);
             for placed in grids.iter_mut().flat_map(|grid| grid.values_mut()) {
-                placed.position = Pyramid::to_level_0(level, placed.position);
+                placed.position = Pyramid::to_level_0(level, placed.position + first);
             }
-            View { grids, has_chain: has_chain(&blurred, &saddles) }
+            grids
         };
-        let image = &coarse.levels()[0];
-        let ways: [&(dyn Fn() -> Vec<View> + Sync); 3] = [
+        let image = &region.cut_from(&pyramid.levels()[level]);
+        let ways: [&(dyn Fn() -> Vec<Vec<SaddleGrid>> + Sync); 3] = [
             &|| vec![seen(image)],
             &|| in_steps::<N>(image, i16::min).iter().map(seen).collect(),
             &|| in_steps::<N>(image, i16::max).iter().map(seen).collect(),
         ];
         ways.into_par_iter().flat_map_iter(|way| way()).collect()
     };
-    let (mut best, mut may_be_finer) = (Vec::new(), true);
     let worth = |grids: &[SaddleGrid]| {
         let is_whole = |grid| whole.is_some_and(|whole| whole.is_shown_by(grid));
         grids.first().map_or(0, |grid| grid.len() + if is_whole(grid) { FALSE_CORNERS } else { 0 })
     };
-    for level in (1..pyramid.levels().len()).rev() {
-        // The finest level takes most of the time. On the next one, the tiles of its boards have half as many pixels, and
-        // some of their corners are already joined.
-        if is_all_noise(&pyramid.levels()[level]) || level == 1 && !may_be_finer {
+    let mut best = Vec::new();
+    for (level, image) in pyramid.levels().iter().enumerate().skip(1).rev() {
+        let noise = sample_noise(image);
+        if noise.is_all {
             continue;
         }
-        let views = of_level(level);
-        may_be_finer = views.iter().any(|view| view.has_chain);
+        let mut views = vec![Vec::new(); VIEWS];
+        for region in Blocks::of(pyramid, level, others).even_tiles() {
+            for (view, found) in views.iter_mut().zip(of_region(level, noise.sigma, &region)) {
+                view.extend(found);
+            }
+        }
+        for view in &mut views {
+            view.sort_by_key(|grid| std::cmp::Reverse(grid.len()));
+        }
         // Of equally good ones, the finest level.
-        let largest = views.into_iter().map(|view| view.grids).max_by_key(|grids| worth(grids));
+        let largest = views.into_iter().max_by_key(|grids| worth(grids));
         best = largest.filter(|grids| worth(grids) >= worth(&best)).unwrap_or(best);
     }
     best
-}
-
-/// What an image shows whose edges have been moved.
-struct View {
-    grids: Vec<SaddleGrid>,
-    /// Whether corners are joined, as on a board.
-    has_chain: bool,
 }
 
 /// Returns images whose edges have been moved by one and by two pixels.

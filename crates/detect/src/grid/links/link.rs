@@ -34,12 +34,6 @@ pub(crate) struct Link {
 /// The links of a corner along its rays.
 pub(crate) type Links<const N: usize> = [Option<Link>; N];
 
-/// Returns whether an edge connects two neighbours of a corner to it. In images without a board, few corners have even
-/// one such neighbour.
-pub(crate) fn has_chain<const N: usize>(pyramid: &Pyramid, saddles: &[Saddle<N>]) -> bool {
-    links(pyramid, saddles).iter().any(|links| links.iter().flatten().count() >= 2)
-}
-
 /// Returns the links of every corner along its N rays; links are mutual.
 pub(crate) fn links<const N: usize>(pyramid: &Pyramid, saddles: &[Saddle<N>]) -> Vec<Links<N>> {
     let positions: Vec<DVec2> = saddles.iter().map(|saddle| saddle.position).collect();
