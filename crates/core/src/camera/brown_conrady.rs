@@ -146,20 +146,24 @@ impl LensLaw for BrownConrady {
     }
 
     fn image(&self, point: DVec3, by_parameters: &mut [[f64; 2]]) -> Option<Imaged> {
-        if point.z <= MIN_FORWARD * point.length() {
+        let least = MIN_FORWARD * MIN_FORWARD * point.length_squared();
+        if !(point.z > 0.0 && point.z * point.z > least) {
             return None;
         }
-        let plane @ DVec2 { x, y } = point.truncate() / point.z;
+        let nearness = 1.0 / point.z;
+        let plane @ DVec2 { x, y } = point.truncate() * nearness;
         let q = plane.length_squared();
         let radial = self.radial(q);
         if !(radial.valid || self.is_rational()) {
             return None;
         }
         let (at, by_plane) = self.distort(plane, &radial);
-        let by_point = by_plane
-            .map(|[by_x, by_y]| [by_x / point.z, by_y / point.z, -(x * by_x + y * by_y) / point.z]);
+        let by_point = by_plane.map(|[by_x, by_y]| {
+            [by_x * nearness, by_y * nearness, -(x * by_x + y * by_y) * nearness]
+        });
         let Radial { rho, below, .. } = radial;
-        let up = |power: f64| [x * power / below, y * power / below];
+        let (x_up, y_up) = (x / below, y / below);
+        let up = |power: f64| [x_up * power, y_up * power];
         let down = |power: f64| up(-rho * power);
         by_parameters[..12].copy_from_slice(&[
             up(q),

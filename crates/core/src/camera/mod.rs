@@ -85,6 +85,15 @@ pub struct Projection {
 }
 
 impl Projection {
+    /// A projection to overwrite by [`Camera::project_into`].
+    pub const EMPTY: Self = Self {
+        pixel: DVec2::ZERO,
+        by_point: [[0.0; 3]; 2],
+        by_parameters: [[0.0; 2]; MAX_PARAMETERS],
+        knots: None,
+        focal_px: DVec2::ZERO,
+    };
+
     /// Returns the derivative of a pixel coordinate with respect to the same coordinate of the
     /// normalised image.
     #[doc(hidden)]
@@ -167,26 +176,39 @@ impl Camera {
     /// assert!(ray.direction.angle_between(DVec3::new(1.0, 0.0, 1.0)) < 1e-6);
     /// ```
     pub fn project(&self, point: DVec3) -> Option<DVec2> {
-        let projection = self.project_with_derivatives(point)?;
-        self.lens.covers(point).then_some(projection.pixel)
+        self.image(point).filter(|_| self.lens.covers(point))
     }
 
-    /// Projects a point and computes the derivatives with respect to the point and to every
-    /// parameter. Unlike [`Self::project`], it
-    /// ignores gaps in the domain of a rational lens, because an optimiser must cross them.
+    /// Projects a point like [`Self::project`], but ignores gaps in the domain of a rational lens, because an optimiser
+    /// must cross them.
+    pub fn image(&self, point: DVec3) -> Option<DVec2> {
+        let Imaged { at, .. } = self.lens.image(point, &mut [[0.0; 2]; MAX_LENS_PARAMETERS])?;
+        let pixel = self.focal_px * at + self.centre_px;
+        pixel.is_finite().then_some(pixel)
+    }
+
+    /// Projects a point like [`Self::image`], and computes the derivatives with respect to the point and to every
+    /// parameter.
     pub fn project_with_derivatives(&self, point: DVec3) -> Option<Projection> {
+        let mut found = Projection::EMPTY;
+        self.project_into(point, &mut found)?;
+        Some(found)
+    }
+
+    /// The same with a projection to overwrite, because copying one takes as long as computing it.
+    pub fn project_into(&self, point: DVec3, found: &mut Projection) -> Option<()> {
         let focal = self.focal_px;
-        let mut by_parameters = [[0.0; 2]; MAX_PARAMETERS];
+        let by_parameters = &mut found.by_parameters;
         let Imaged { at, by_point } = self.lens.image(point, &mut by_parameters[4..])?;
         for [by_x, by_y] in &mut by_parameters[4..] {
             (*by_x, *by_y) = (focal.x * *by_x, focal.y * *by_y);
         }
         by_parameters[..4].copy_from_slice(&[[at.x, 0.0], [0.0, at.y], [1.0, 0.0], [0.0, 1.0]]);
-        let pixel = focal * at + self.centre_px;
-        let by_point = [by_point[0].map(|v| focal.x * v), by_point[1].map(|v| focal.y * v)];
-        let knots = self.lens.knots(point);
-        let found = Projection { pixel, by_point, by_parameters, knots, focal_px: focal };
-        pixel.is_finite().then_some(found)
+        found.pixel = focal * at + self.centre_px;
+        found.by_point = [by_point[0].map(|v| focal.x * v), by_point[1].map(|v| focal.y * v)];
+        found.knots = self.lens.knots(point);
+        found.focal_px = focal;
+        found.pixel.is_finite().then_some(())
     }
 
     /// Returns the line of sight of a pixel; `None` outside the domain of the model.

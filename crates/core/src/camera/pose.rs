@@ -15,6 +15,7 @@ impl Pose {
     pub const IDENTITY: Pose = Pose { rotation: DQuat::IDENTITY, translation: DVec3::ZERO };
 
     /// Maps a point x of the first frame to R·x + t in the second frame, mm.
+    #[inline]
     pub fn apply(&self, point: DVec3) -> DVec3 {
         self.rotation * point + self.translation
     }
