@@ -156,12 +156,13 @@ pub(super) fn shared_outliers(
     for ((block, outliers), _) in taking_part.filter(|(_, left_out)| !**left_out) {
         let camera = &problem.cameras[block.camera].camera;
         let cell_px = f64::from(camera.width.max(camera.height)) / CELLS;
-        for (corner, &outlier) in block.observations.iter().zip(outliers) {
+        let corners = block.observations.iter().zip(problem.residuals(block));
+        for ((corner, off), &outlier) in corners.zip(outliers) {
             all.add(outlier);
             cameras.entry(block.camera).or_default().add(outlier);
             views.entry((block.camera, block.frame)).or_default().add(outlier);
             // Uses the predicted position, because wrong detected positions may be anywhere.
-            let Some(off) = problem.residual(block, corner) else { continue };
+            let Some(off) = off else { continue };
             let cell = ((corner.pixel - off) / cell_px).floor().as_ivec2().to_array();
             let (count, of_views) = cells.entry((block.camera, cell)).or_default();
             count.add(outlier);

@@ -164,9 +164,9 @@ fn seen<'a>(problem: &'a Problem, whitening: &Whitening) -> (Vec<Seen<'a>>, f64)
             * problem.frames[block.frame].rotation
             * problem.scene_from_panel(block.panel).rotation;
         let panel_from_camera = DMat3::from_quat(camera_from_panel.conjugate());
-        for (corner, &w) in block.observations.iter().zip(weights) {
-            let at = camera.project_with_derivatives(problem.camera_point(block, corner));
-            let Some(at) = at else { continue };
+        let corners = block.observations.iter().zip(problem.camera_points(block));
+        for ((corner, point), &w) in corners.zip(weights) {
+            let Some(at) = camera.project_with_derivatives(point) else { continue };
             let residual = corner.pixel - at.pixel;
             if whitening.is_outlier(w, residual) {
                 continue;

@@ -181,8 +181,7 @@ fn smooth_neighbours(
     gross: &[bool],
     is_off: impl Fn(usize) -> bool,
 ) -> Vec<[usize; 2]> {
-    let off: Vec<Option<DVec2>> =
-        block.observations.iter().map(|seen| problem.residual(block, seen)).collect();
+    let off: Vec<Option<DVec2>> = problem.residuals(block).collect();
     let places: BTreeMap<(i32, i32), usize> =
         block.observations.iter().enumerate().map(|(i, seen)| ((seen.row, seen.col), i)).collect();
     let of_corner = |(index, seen): (usize, &Observation)| {
@@ -242,8 +241,8 @@ pub(crate) fn variance(minimum: &Minimum, whitening: &Whitening, loss: Loss) -> 
     // Priors on poses and offsets contribute to the cost, too.
     let (mut cost, mut pull, mut weight, mut slope) = (0.0, 0.0, 0.0, 0.0);
     for (block, weights) in problem.blocks.iter().zip(&whitening.blocks) {
-        for (seen, &w) in block.observations.iter().zip(weights) {
-            let Some(off) = problem.residual(block, seen) else { continue };
+        for (off, &w) in problem.residuals(block).zip(weights) {
+            let Some(off) = off else { continue };
             let squared = Whitening::apply(w, off).length_squared();
             let influence = loss.influence(squared, whitening.sigma);
             cost += loss.of(squared, whitening.sigma).0;

@@ -384,9 +384,7 @@ fn reestimate_pose(problem: &mut Problem, frame: usize, wrong: &BTreeSet<PanelRe
     let is_right = |block: &&Block| block.frame == frame && !wrong.contains(&block.panel);
     let off_px = |problem: &Problem| {
         let blocks = problem.blocks.iter().filter(is_right);
-        let seen =
-            blocks.flat_map(|block| block.observations.iter().map(move |seen| (block, seen)));
-        let residuals = seen.map(|(block, seen)| problem.residual(block, seen));
+        let residuals = blocks.flat_map(|block| problem.residuals(block));
         median(residuals.map(|r| r.map_or(f64::INFINITY, |r| r.x.hypot(r.y))).collect())
             .unwrap_or(0.0)
     };

@@ -3,11 +3,10 @@
 use std::collections::BTreeSet;
 
 use glam::{DMat3, DVec2, DVec3};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, DMatrixView, Matrix3, Vector3};
 
 use super::layout::Layout;
 use crate::input::loss::Loss;
-use crate::input::observation::Observation;
 use crate::problem::bundle::Problem;
 use crate::problem::shape;
 use crate::problem::unknowns::{Block, CameraUnknowns};
@@ -97,23 +96,41 @@ pub(crate) struct OfCorner {
     pub right: Vector3<f64>,
 }
 
-/// Passes the derivatives with respect to a pose to `push`: for y = exp(ω) a + t + τ, a derivative j with respect to y
-/// becomes a × j for ω, and j for τ.
-fn pose(arm: DVec3, by: DVec3, push: &mut impl FnMut(f64)) {
-    arm.cross(by).to_array().into_iter().chain(by.to_array()).for_each(push);
+/// The motion of the corners of a panel to a coordinate frame along the chain to the camera.
+struct Motion {
+    rotation: DMat3,
+    translation: DVec3,
+    /// The translation of the last link.
+    last: DVec3,
+}
+
+impl Motion {
+    fn of(whole: &Pose, last: &Pose) -> Self {
+        let (rotation, translation) = (DMat3::from_quat(whole.rotation), whole.translation);
+        Self { rotation, translation, last: last.translation }
+    }
+
+    fn apply(&self, at: DVec3) -> DVec3 {
+        self.rotation * at + self.translation
+    }
+
+    /// Passes the derivatives with respect to the pose of the last link to `push`, from that with respect to the
+    /// position on the panel: for y = exp(ω) a + t + τ, a derivative j with respect to y becomes a × j for ω, and j for
+    /// τ.
+    fn derivatives(&self, at: DVec3, by_place: DVec3, push: &mut impl FnMut(f64)) {
+        let arm = self.rotation * at + (self.translation - self.last);
+        let by = self.rotation * by_place;
+        arm.cross(by).to_array().into_iter().chain(by.to_array()).for_each(push);
+    }
 }
 
 /// The coordinate frames between the panel of a block and its camera, and the unknown links between them.
 struct Chain<'a> {
-    problem: &'a Problem,
-    block: &'a Block,
     camera: &'a CameraUnknowns,
-    rig_from_scene: &'a Pose,
-    scene_from_target: &'a Pose,
-    target_from_panel: &'a Pose,
-    rig_from_camera: DMat3,
-    scene_from_rig: DMat3,
-    target_from_scene: DMat3,
+    to_target: Motion,
+    to_scene: Motion,
+    to_rig: Motion,
+    to_camera: Motion,
     /// First columns of the unknown pose of the camera, of the panel, of the target, and of the shape.
     of_camera: Option<usize>,
     of_panel: Option<usize>,
@@ -121,30 +138,20 @@ struct Chain<'a> {
     of_shape: Option<usize>,
 }
 
-/// The position of a corner along the chain from the panel to the camera: before each translation, and at the end.
-struct Along {
-    turned_panel: DVec3,
-    turned_target: DVec3,
-    turned_scene: DVec3,
-    turned_rig: DVec3,
-    in_camera: DVec3,
-}
-
 impl<'a> Chain<'a> {
-    fn of(problem: &'a Problem, layout: &Layout, block: &'a Block) -> Self {
+    fn of(problem: &'a Problem, layout: &Layout, block: &Block) -> Self {
         let camera = &problem.cameras[block.camera];
         let (rig, panel) = (&problem.frames[block.frame], &problem.panels[block.panel.index()]);
         let target = &problem.targets[panel.target].scene_from_target;
+        let scene_from_panel = target.after(&panel.target_from_panel);
+        let rig_from_panel = rig.after(&scene_from_panel);
+        let camera_from_panel = camera.camera_from_rig.after(&rig_from_panel);
         Self {
-            problem,
-            block,
             camera,
-            rig_from_scene: rig,
-            scene_from_target: target,
-            target_from_panel: &panel.target_from_panel,
-            rig_from_camera: DMat3::from_quat(camera.camera_from_rig.rotation.conjugate()),
-            scene_from_rig: DMat3::from_quat(rig.rotation.conjugate()),
-            target_from_scene: DMat3::from_quat(target.rotation.conjugate()),
+            to_target: Motion::of(&panel.target_from_panel, &panel.target_from_panel),
+            to_scene: Motion::of(&scene_from_panel, target),
+            to_rig: Motion::of(&rig_from_panel, rig),
+            to_camera: Motion::of(&camera_from_panel, &camera.camera_from_rig),
             of_camera: layout.cameras[block.camera],
             of_panel: layout.panels[block.panel.index()],
             of_target: layout.targets[panel.target],
@@ -159,54 +166,26 @@ impl<'a> Chain<'a> {
         poses.chain(self.of_shape.into_iter().flat_map(|first| first..first + shape::COUNT))
     }
 
-    #[inline]
-    fn along(&self, seen: &Observation) -> Along {
-        let Self { problem, block, camera, .. } = *self;
-        let turned_panel = self.target_from_panel.rotation * problem.panel_point(block, seen);
-        let in_target = turned_panel + self.target_from_panel.translation;
-        let turned_target = self.scene_from_target.rotation * in_target;
-        let in_scene = turned_target + self.scene_from_target.translation;
-        let turned_scene = self.rig_from_scene.rotation * in_scene;
-        let in_rig = turned_scene + self.rig_from_scene.translation;
-        let turned_rig = camera.camera_from_rig.rotation * in_rig;
-        let in_camera = turned_rig + camera.camera_from_rig.translation;
-        Along { turned_panel, turned_target, turned_scene, turned_rig, in_camera }
-    }
-
-    /// The pixel of a corner; `None` if the camera cannot image it.
-    fn project(&self, along: &Along) -> Option<Projection> {
-        self.camera.camera.project_with_derivatives(along.in_camera)
+    /// The pixel of a corner at a position on its panel; `None` if the camera cannot image it.
+    fn project(&self, at: DVec3, found: &mut Projection) -> Option<()> {
+        self.camera.camera.project_into(self.to_camera.apply(at), found)
     }
 
     /// Passes the derivatives of a coordinate with respect to the unknown links, the shape (which `bends` the corner
-    /// along these directions) and the frame's pose to `push`, from the derivative with respect to the point in the
-    /// camera frame. Returns the derivative with respect to the position of the corner on its panel.
+    /// along these directions) and the frame's pose to `push`, for a position on the panel. `by_place` is the
+    /// derivative with respect to this position.
     fn derivatives(
         &self,
-        along: &Along,
-        by_camera: DVec3,
+        at: DVec3,
+        by_place: DVec3,
         bends: Option<&[DVec3; shape::COUNT]>,
         push: &mut impl FnMut(f64),
-    ) -> DVec3 {
-        // For y = exp(ω) a + t + τ, a derivative j with respect to y becomes a × j for ω, and j for τ.
-        let by_rig = self.rig_from_camera * by_camera;
-        if self.of_camera.is_some() {
-            pose(along.turned_rig, by_camera, push);
-        }
-        let by_scene = self.scene_from_rig * by_rig;
-        let by_target = self.target_from_scene * by_scene;
-        if self.of_panel.is_some() {
-            pose(along.turned_panel, by_target, push);
-        }
-        if self.of_target.is_some() {
-            pose(along.turned_target, by_scene, push);
-        }
-        let by_place = self.target_from_panel.rotation.conjugate() * by_target;
-        if let Some(bends) = bends {
-            bends.iter().for_each(|&bend| push(by_place.dot(bend)));
-        }
-        pose(along.turned_scene, by_rig, push);
-        by_place
+    ) {
+        self.of_camera.iter().for_each(|_| self.to_camera.derivatives(at, by_place, push));
+        self.of_panel.iter().for_each(|_| self.to_target.derivatives(at, by_place, push));
+        self.of_target.iter().for_each(|_| self.to_scene.derivatives(at, by_place, push));
+        bends.into_iter().flatten().for_each(|&bend| push(by_place.dot(bend)));
+        self.to_rig.derivatives(at, by_place, push);
     }
 }
 
@@ -223,7 +202,8 @@ impl Local {
         let free = &layout.parameters[block.camera];
         let support = match chain.camera.camera.lens {
             Lens::Spline(_) if !free.is_empty() => {
-                let seen = block.observations.iter().map(|seen| chain.project(&chain.along(seen)));
+                let points = problem.camera_points(block);
+                let seen = points.map(|at| chain.camera.camera.project_with_derivatives(at));
                 let seen = seen.collect::<Option<Vec<Projection>>>()?;
                 Support::of(free, &seen, chain.camera.free.len())
             }
@@ -235,29 +215,23 @@ impl Local {
             None => free.iter().map(|&(_, column)| column).chain(poses).collect(),
         };
         let n = columns.len() + 6;
-        let matrix = vec![0.0; n * (n + 1) / 2];
-        let mut local = Self {
-            cost: 0.0,
-            columns,
-            matrix,
-            right: vec![0.0; n],
-            corners: Vec::new(),
-            cross: Vec::new(),
-        };
+        let mut sums = Sums::of(n);
+        let (mut cost, mut corners, mut cross) = (0.0, Vec::new(), Vec::new());
         if problem.map.is_some() {
             let count = block.observations.len();
-            (local.corners, local.cross) =
-                (Vec::with_capacity(count), Vec::with_capacity(n * count));
+            (corners, cross) = (Vec::with_capacity(count), Vec::with_capacity(n * count));
         }
         let mut rows = [[0.0; LONGEST_ROW]; 2];
         // For a spline: the columns of the corner, that is, of its knots and all columns after those of the lens.
         let mut places: Vec<usize> = Vec::new();
-        for (seen, &w) in block.observations.iter().zip(whitening) {
+        let mut indices = problem.map.as_ref().map(|map| map.indices(block));
+        let points = problem.panel_points(block);
+        let mut at = Projection::EMPTY;
+        for ((seen, &w), place) in block.observations.iter().zip(whitening).zip(points) {
             let bends = problem.shape.map(|shape| shape.directions(seen.panel_mm));
-            let mapped = problem.map.as_ref().map(|map| map.index(block.panel, seen));
-            let along = chain.along(seen);
-            let at = chain.project(&along)?;
-            let mut by_place = [DVec3::ZERO; 2];
+            chain.project(place, &mut at)?;
+            let panel_from_camera = chain.to_camera.rotation.transpose();
+            let by_place = at.by_point.map(|by| panel_from_camera * DVec3::from(by));
             if let Some(support) = &support {
                 support.places(&at, n, &mut places);
             }
@@ -275,32 +249,42 @@ impl Local {
                         }
                     }
                 }
-                let by_camera = DVec3::from(at.by_point[i]);
-                by_place[i] = chain.derivatives(&along, by_camera, bends.as_ref(), &mut push);
+                chain.derivatives(place, by_place[i], bends.as_ref(), &mut push);
             }
             let residual = seen.pixel - at.pixel;
+            let squared = Whitening::apply(w, residual).length_squared();
+            let (of_corner, weight) = loss.of(squared, sigma);
+            cost += of_corner;
+            // Everything below is whitened, and counts according to the loss.
+            let [a, b, c] = w.map(|w| w * weight.sqrt());
+            let residual = Whitening::apply([a, b, c], residual);
+            let by_place = [a * by_place[0], b * by_place[0] + c * by_place[1]];
+            let [along_x, along_y] = &mut rows;
             let count = if support.is_some() { places.len() } else { n };
+            for (x, y) in along_x[..count].iter_mut().zip(along_y) {
+                (*x, *y) = (a * *x, b * *x + c * *y);
+            }
             let rows = [&rows[0][..count], &rows[1][..count]];
-            let weight = match support {
-                Some(_) => local.add_some(&places, rows, residual, w, loss, sigma),
-                None => local.add(rows, residual, w, loss, sigma),
-            };
-            if let Some(index) = mapped {
-                let (corner, cross) = OfCorner::new(index, rows, by_place, residual, w, weight);
-                local.corners.push(corner);
-                if support.is_some() {
-                    let first = local.cross.len();
-                    local.cross.resize(first + n, [0.0; 3]);
-                    places
-                        .iter()
-                        .zip(cross)
-                        .for_each(|(place, of)| local.cross[first + place] = of);
-                } else {
-                    local.cross.extend(cross);
+            match support {
+                Some(_) => sums.add_some(&places, rows, residual),
+                None => sums.add(rows, residual),
+            }
+            if let Some(index) = indices.as_mut().and_then(|of| of.next()?) {
+                corners.push(OfCorner::new(index, by_place, residual));
+                let first = cross.len();
+                cross.resize(first + n, [0.0; 3]);
+                let own = &mut cross[first..];
+                let products = rows[0].iter().zip(rows[1]);
+                let products =
+                    products.map(|(&x, &y)| (x * by_place[0] + y * by_place[1]).to_array());
+                match support {
+                    Some(_) => places.iter().zip(products).for_each(|(&place, of)| own[place] = of),
+                    None => own.iter_mut().zip(products).for_each(|(own, of)| *own = of),
                 }
             }
         }
-        Some(local)
+        let (matrix, right) = sums.finish();
+        Some(Self { cost, columns, matrix, right, corners, cross })
     }
 
     /// The corners, if they are unknown, each with the product with each column of the block.
@@ -312,81 +296,82 @@ impl Local {
     pub(crate) fn row(&self, i: usize) -> &[f64] {
         &self.matrix[i * (i + 1) / 2..][..=i]
     }
+}
 
-    /// Adds the two rows of a corner in some columns, given in ascending order; returns the weight
-    /// from the loss.
-    fn add_some(
-        &mut self,
-        places: &[usize],
-        [along_x, along_y]: [&[f64]; 2],
-        residual: DVec2,
-        w: [f64; 3],
-        loss: Loss,
-        sigma: f64,
-    ) -> f64 {
-        let r = Whitening::apply(w, residual);
-        let (cost, weight) = loss.of(r.length_squared(), sigma);
-        self.cost += cost;
-        let [a, b, c] = w;
-        for (i, &place) in places.iter().enumerate() {
-            let (x, y) = (weight * a * along_x[i], weight * (b * along_x[i] + c * along_y[i]));
-            self.right[place] += x * r.x + y * r.y;
-            let (by_x, by_y) = (a * x + b * y, c * y);
-            let row = &mut self.matrix[place * (place + 1) / 2..];
-            for (j, &column) in places[..=i].iter().enumerate() {
-                row[column] += by_x * along_x[j] + by_y * along_y[j];
-            }
-        }
-        weight
+/// Number of rows whose products are summed at once.
+const ROWS_AT_A_TIME: usize = 128;
+
+/// The sums of the products of whitened rows with each other, and with their residuals.
+struct Sums {
+    /// Rows of the lower triangle, one after the other.
+    matrix: Vec<f64>,
+    right: Vec<f64>,
+    /// Rows that are not added yet, each followed by its residual.
+    rows: Vec<f64>,
+    /// The sums of the products of added rows.
+    whole: DMatrix<f64>,
+}
+
+impl Sums {
+    fn of(n: usize) -> Self {
+        let (matrix, right) = (vec![0.0; n * (n + 1) / 2], vec![0.0; n]);
+        let rows = Vec::with_capacity((n + 1) * ROWS_AT_A_TIME);
+        Self { matrix, right, rows, whole: DMatrix::zeros(0, 0) }
     }
 
-    /// Adds the two rows of a corner; returns the weight from the loss.
-    fn add(
-        &mut self,
-        [along_x, along_y]: [&[f64]; 2],
-        residual: DVec2,
-        w: [f64; 3],
-        loss: Loss,
-        sigma: f64,
-    ) -> f64 {
-        let r = Whitening::apply(w, residual);
-        let (cost, weight) = loss.of(r.length_squared(), sigma);
-        self.cost += cost;
-        let [a, b, c] = w;
-        let mut rest = self.matrix.as_mut_slice();
-        for (i, right) in self.right.iter_mut().enumerate() {
-            let (x, y) = (weight * a * along_x[i], weight * (b * along_x[i] + c * along_y[i]));
-            *right += x * r.x + y * r.y;
-            let (by_x, by_y) = (a * x + b * y, c * y);
-            let (row, below) = rest.split_at_mut(i + 1);
-            for ((value, of_x), of_y) in row.iter_mut().zip(along_x).zip(along_y) {
-                *value += by_x * of_x + by_y * of_y;
-            }
-            rest = below;
+    /// Adds the two rows of a corner.
+    fn add(&mut self, [along_x, along_y]: [&[f64]; 2], residual: DVec2) {
+        for (row, residual) in [(along_x, residual.x), (along_y, residual.y)] {
+            self.rows.extend_from_slice(row);
+            self.rows.push(residual);
         }
-        weight
+        if self.rows.len() == self.rows.capacity() {
+            self.add_rows();
+        }
+    }
+
+    fn add_rows(&mut self) {
+        let n = self.right.len() + 1;
+        let rows = DMatrixView::from_slice(&self.rows, n, self.rows.len() / n);
+        if self.whole.is_empty() {
+            self.whole = DMatrix::zeros(n, n);
+        }
+        self.whole.gemm(1.0, &rows, &rows.transpose(), 1.0);
+        self.rows.clear();
+    }
+
+    /// Adds the two rows of a corner in some columns, given in ascending order.
+    fn add_some(&mut self, places: &[usize], [along_x, along_y]: [&[f64]; 2], residual: DVec2) {
+        for (i, &place) in places.iter().enumerate() {
+            let (x, y) = (along_x[i], along_y[i]);
+            self.right[place] += x * residual.x + y * residual.y;
+            let row = &mut self.matrix[place * (place + 1) / 2..];
+            for (j, &column) in places[..=i].iter().enumerate() {
+                row[column] += x * along_x[j] + y * along_y[j];
+            }
+        }
+    }
+
+    /// The rows of the lower triangle, and the products with the residuals.
+    fn finish(mut self) -> (Vec<f64>, Vec<f64>) {
+        let n = self.right.len();
+        if !self.rows.is_empty() {
+            self.add_rows();
+        }
+        if !self.whole.is_empty() {
+            let column = |i: usize| self.whole.column(i).into_iter().copied();
+            self.matrix = (0..n).flat_map(|i| column(i).take(i + 1)).collect();
+            self.right = column(n).take(n).collect();
+        }
+        (self.matrix, self.right)
     }
 }
 
 impl OfCorner {
-    /// The contribution of a corner, and the product with each of its columns.
-    fn new<'a>(
-        index: usize,
-        [along_x, along_y]: [&'a [f64]; 2],
-        by_place: [DVec3; 2],
-        residual: DVec2,
-        w: [f64; 3],
-        weight: f64,
-    ) -> (Self, impl Iterator<Item = [f64; 3]> + 'a) {
-        let r = Whitening::apply(w, residual);
-        let [a, b, c] = w;
-        let (x, y) = (a * by_place[0], b * by_place[0] + c * by_place[1]);
-        // With respect to the residual before whitening.
-        let (by_x, by_y) = (weight * (a * x + b * y), weight * (c * y));
-        let cross = along_x.iter().zip(along_y);
-        let cross = cross.map(move |(&of_x, &of_y)| (by_x * of_x + by_y * of_y).to_array());
-        let own = Matrix3::from_fn(|k, l| by_x[k] * by_place[0][l] + by_y[k] * by_place[1][l]);
-        let right = weight * (x * r.x + y * r.y);
-        (Self { index, own, right: right.to_array().into() }, cross)
+    /// The contribution of a corner, from its whitened residual and its derivatives.
+    fn new(index: usize, [x, y]: [DVec3; 2], residual: DVec2) -> Self {
+        let own = Matrix3::from_fn(|k, l| x[k] * x[l] + y[k] * y[l]);
+        let right = x * residual.x + y * residual.y;
+        Self { index, own, right: right.to_array().into() }
     }
 }

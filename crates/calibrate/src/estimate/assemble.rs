@@ -177,9 +177,10 @@ fn views(cameras: &[CameraViews], frames: &[&Frame], settled: &Settled) -> Vec<V
     let Settled { problem, outliers, .. } = settled;
     let mut corners: BTreeMap<(usize, usize), Vec<Corner>> = BTreeMap::new();
     for (block, outliers) in problem.blocks.iter().zip(outliers) {
-        let of_block = block.observations.iter().zip(outliers).filter_map(|(seen, &outlier)| {
+        let seen = block.observations.iter().zip(problem.residuals(block));
+        let of_block = seen.zip(outliers).filter_map(|((seen, residual), &outlier)| {
             let (panel, row, col, pixel) = (block.panel, seen.row, seen.col, seen.pixel);
-            let residual = problem.residual(block, seen)?;
+            let residual = residual?;
             Some(Corner { panel, row, col, pixel, residual, outlier })
         });
         corners.entry((block.camera, block.frame)).or_default().extend(of_block);
@@ -306,8 +307,9 @@ fn weights(map: &CornerMap, settled: &Settled, loss: Loss) -> Vec<(f64, usize)> 
         if part.observations.is_empty() {
             continue;
         }
-        for ((seen, off), outlier) in block.observations.iter().zip(off).zip(outliers) {
-            let (weight, count) = &mut weights[map.index(block.panel, seen)];
+        for ((index, off), outlier) in map.indices(block).zip(off).zip(outliers) {
+            let Some(index) = index else { continue };
+            let (weight, count) = &mut weights[index];
             *count += 1;
             if !outlier {
                 *weight += loss.influence(off * off, whitening.sigma).weight;

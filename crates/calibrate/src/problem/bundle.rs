@@ -1,12 +1,12 @@
 //! The problem of a bundle adjustment: all unknowns and observations, residuals, and parts of it.
 
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 
 use super::corner_map::CornerMap;
 use super::shape::Shape;
 use super::unknowns::{Block, CameraUnknowns, PanelUnknowns, TargetUnknowns};
 use crate::cancel::Stop;
-use crate::input::observation::{MIN_CORNERS, Observation};
+use crate::input::observation::MIN_CORNERS;
 use crate::input::panel::PanelRef;
 use deltille_core::camera::Pose;
 
@@ -50,34 +50,39 @@ impl Problem {
         })
     }
 
-    /// Position of a corner in the frame of its panel, mm.
-    #[inline]
-    pub(crate) fn panel_point(&self, block: &Block, seen: &Observation) -> DVec3 {
-        let bent = self.shape.map_or(DVec3::ZERO, |shape| shape.offset(seen.panel_mm));
-        let moved = self.map.as_ref().map_or(DVec3::ZERO, |map| map.offset(block.panel, seen));
-        seen.panel_mm + bent + moved
+    /// The positions of the corners of a block in the frame of its panel, mm.
+    pub(crate) fn panel_points<'a>(&'a self, block: &'a Block) -> impl Iterator<Item = DVec3> + 'a {
+        let mut indices = self.map.as_ref().map(|map| (map, map.indices(block)));
+        block.observations.iter().map(move |seen| {
+            let bent = self.shape.map_or(DVec3::ZERO, |shape| shape.offset(seen.panel_mm));
+            let index = indices.as_mut().and_then(|(map, of)| Some((map, of.next()??)));
+            let moved = index.map_or(DVec3::ZERO, |(map, index)| map.offsets_mm[index]);
+            seen.panel_mm + bent + moved
+        })
     }
 
-    /// Position of a corner in the frame of the camera that saw it, mm.
-    #[inline]
-    pub(crate) fn camera_point(&self, block: &Block, observation: &Observation) -> DVec3 {
-        let at = self.panel_point(block, observation);
-        let target = self.panels[block.panel.index()].target_from_panel.apply(at);
-        let scene = self.scene_from_target(block.panel).apply(target);
-        let rig = self.frames[block.frame].apply(scene);
-        self.cameras[block.camera].camera_from_rig.apply(rig)
+    /// The positions of the corners of a block in the frame of its camera, mm.
+    pub(crate) fn camera_points<'a>(
+        &'a self,
+        block: &'a Block,
+    ) -> impl Iterator<Item = DVec3> + 'a {
+        let camera_from_scene =
+            self.cameras[block.camera].camera_from_rig.after(&self.frames[block.frame]);
+        let Pose { rotation, translation } =
+            camera_from_scene.after(&self.scene_from_panel(block.panel));
+        let rotation = DMat3::from_quat(rotation);
+        self.panel_points(block).map(move |at| rotation * at + translation)
     }
 
-    /// Detected minus predicted positions of the corners of a block, px; `None` if the camera cannot image one of them.
-    pub(crate) fn residuals(&self, block: &Block) -> Option<Vec<DVec2>> {
-        block.observations.iter().map(|seen| self.residual(block, seen)).collect()
-    }
-
-    /// Detected minus predicted position of a corner, px; `None` if the camera cannot image it.
-    pub(crate) fn residual(&self, block: &Block, seen: &Observation) -> Option<DVec2> {
+    /// Detected minus predicted positions of the corners of a block, px; `None` for a corner that the camera cannot
+    /// image.
+    pub(crate) fn residuals<'a>(
+        &'a self,
+        block: &'a Block,
+    ) -> impl Iterator<Item = Option<DVec2>> + 'a {
         let camera = &self.cameras[block.camera].camera;
-        let at = camera.project_with_derivatives(self.camera_point(block, seen))?;
-        Some(seen.pixel - at.pixel)
+        let seen = block.observations.iter().zip(self.camera_points(block));
+        seen.map(|(seen, point)| Some(seen.pixel - camera.image(point)?))
     }
 
     /// Number of all corners.

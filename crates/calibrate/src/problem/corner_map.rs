@@ -21,13 +21,9 @@ const FIRST_PRIOR: f64 = 0.01;
 /// Minimum prior standard deviation, mm: a hundredth of the resolution of the best print.
 const MIN_PRIOR_MM: f64 = 1e-4;
 
-/// A corner of a panel: index of the panel, row, column.
-type Label = (usize, i32, i32);
-
 /// Offsets of corners on their panels.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct CornerMap {
-    index: BTreeMap<Label, usize>,
     /// The corners, ordered by label.
     pub corners: Vec<MappedCorner>,
     /// The offset of each corner from its planned position, in the frame of its panel, mm.
@@ -48,27 +44,29 @@ pub(crate) struct MappedCorner {
     pub panel_mm: DVec3,
 }
 
+/// A corner of a panel: panel, row, column.
+type Label = (PanelRef, i32, i32);
+
+impl MappedCorner {
+    fn label(&self) -> Label {
+        (self.panel, self.row, self.col)
+    }
+}
+
 impl CornerMap {
     /// All corners that the blocks observe, with zero offsets and the initial prior.
     pub(crate) fn flat(blocks: &[Block]) -> Self {
-        let mut index = BTreeMap::new();
-        let mut corners: Vec<MappedCorner> = Vec::new();
-        for block in blocks {
-            for &Observation { row, col, panel_mm, .. } in block.observations.iter() {
-                let at = *index.entry((block.panel.index(), row, col)).or_insert(corners.len());
-                if at == corners.len() {
-                    let panel = block.panel;
-                    corners.push(MappedCorner { panel, row, col, panel_mm });
-                }
+        let mut corners: BTreeMap<Label, MappedCorner> = BTreeMap::new();
+        for &Block { panel, ref observations, .. } in blocks {
+            for &Observation { row, col, panel_mm, .. } in observations.iter() {
+                let corner = MappedCorner { panel, row, col, panel_mm };
+                corners.entry(corner.label()).or_insert(corner);
             }
         }
-        // Ordered by label.
-        corners.sort_by_key(|corner| (corner.panel, corner.row, corner.col));
-        let labels = corners.iter().map(|corner| (corner.panel.index(), corner.row, corner.col));
-        let index = labels.enumerate().map(|(at, label)| (label, at)).collect();
+        let corners: Vec<MappedCorner> = corners.into_values().collect();
         let offsets_mm = vec![DVec3::ZERO; corners.len()];
         let prior_mm = DVec3::splat(FIRST_PRIOR * nearest_mm(&corners));
-        Self { index, corners, offsets_mm, prior_mm, determined: 0.0 }
+        Self { corners, offsets_mm, prior_mm, determined: 0.0 }
     }
 
     /// The same map with another prior, mm, and the number of offsets that the views determine.
@@ -90,20 +88,27 @@ impl CornerMap {
     pub(crate) fn views(&self, blocks: &[Block]) -> Vec<usize> {
         let mut views = vec![0; self.len()];
         for block in blocks {
-            block.observations.iter().for_each(|seen| views[self.index(block.panel, seen)] += 1);
+            self.indices(block).flatten().for_each(|index| views[index] += 1);
         }
         views
     }
 
-    /// The index of a corner, which must be in the map.
-    pub(crate) fn index(&self, panel: PanelRef, seen: &Observation) -> usize {
-        self.index[&(panel.index(), seen.row, seen.col)]
-    }
-
-    /// The offset of a corner, mm; zero for a corner that is not in the map.
-    pub(crate) fn offset(&self, panel: PanelRef, seen: &Observation) -> DVec3 {
-        let index = self.index.get(&(panel.index(), seen.row, seen.col));
-        index.map_or(DVec3::ZERO, |&index| self.offsets_mm[index])
+    /// The index of each corner of a block; `None` for a corner that is not in the map. A corner that follows the one
+    /// before it in the order of labels is found without a search.
+    pub(crate) fn indices<'a>(
+        &'a self,
+        block: &'a Block,
+    ) -> impl Iterator<Item = Option<usize>> + 'a {
+        let mut next = 0;
+        block.observations.iter().map(move |seen| {
+            let own = (block.panel, seen.row, seen.col);
+            let found = match self.corners.get(next) {
+                Some(corner) if corner.label() == own => Some(next),
+                _ => self.corners.binary_search_by_key(&own, MappedCorner::label).ok(),
+            };
+            next = found.map_or(next, |index| index + 1);
+            found
+        })
     }
 
     /// The prior that maximises the marginal likelihood of the offsets, mm, and the number γ of offsets that

@@ -144,7 +144,8 @@ fn triangle([xx, xy, yy]: [f64; 3], common: f64) -> [f64; 3] {
 /// Residuals (observed minus predicted positions), px, for each block; empty for a block with a
 /// corner that its camera cannot image, which problems with valid initial values do not have.
 pub(crate) fn residuals(problem: &Problem) -> Vec<Vec<DVec2>> {
-    problem.blocks.iter().map(|block| problem.residuals(block).unwrap_or_default()).collect()
+    let of_block = |block| problem.residuals(block).collect::<Option<Vec<DVec2>>>();
+    problem.blocks.iter().map(|block| of_block(block).unwrap_or_default()).collect()
 }
 
 /// Whitening with equal weights for all corners, and the standard deviation of their coordinates.
@@ -156,8 +157,8 @@ pub(crate) fn scale(problem: &Problem) -> Whitening {
 pub(crate) fn deviations(problem: &Problem, whitening: &Whitening) -> Vec<Vec<f64>> {
     let weights = whitening.of(problem).blocks;
     let of_block = |(block, weights): (&Block, &Vec<[f64; 3]>)| {
-        let off = block.observations.iter().zip(weights).map(|(seen, &w)| {
-            let off = Whitening::apply(w, problem.residual(block, seen)?);
+        let off = problem.residuals(block).zip(weights).map(|(off, &w)| {
+            let off = Whitening::apply(w, off?);
             Some(off.x.hypot(off.y))
         });
         off.map(|off| off.unwrap_or(f64::INFINITY)).collect()

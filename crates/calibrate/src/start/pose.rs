@@ -170,7 +170,7 @@ fn refine(
         ..Problem::default()
     };
     let first: Option<Vec<_>> =
-        problem.blocks.iter().map(|block| problem.residuals(block)).collect();
+        problem.blocks.iter().map(|block| problem.residuals(block).collect()).collect();
     let whitening = Whitening::fit(&problem, Weights::Equal, &first?);
     // One of several panels may be wrong.
     let loss = if sightings.len() > 1 { Loss::Cauchy } else { Loss::Squared };

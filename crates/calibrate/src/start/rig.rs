@@ -101,7 +101,7 @@ pub(crate) fn start(
     problem.targets = targets_unknown(&blocks, calibration, &places.scene_from_target);
     problem.panels = unknowns(&blocks, calibration);
     // If the camera cannot image a corner at these initial values, no step can reach it.
-    blocks.retain(|block| problem.residuals(block).is_some());
+    blocks.retain(|block| problem.residuals(block).all(|off| off.is_some()));
     problem.blocks = blocks;
     // A first pass in which frames that were not taken at the same time have almost no influence.
     let whitening = scale(&problem);

@@ -178,7 +178,10 @@ impl<'a> Search<'a> {
             problem.frames.push(*pose);
             let first = problem.blocks.len();
             problem.blocks.extend(blocks(&view.sightings, used.len()));
-            if problem.blocks[first..].iter().all(|block| problem.residuals(block).is_some()) {
+            if problem.blocks[first..]
+                .iter()
+                .all(|block| problem.residuals(block).all(|off| off.is_some()))
+            {
                 used.push(index);
             } else {
                 problem.blocks.truncate(first);

@@ -93,8 +93,7 @@ impl ProjectionUncertainty {
         let mut distances = Vec::new();
         let blocks = problem.blocks.iter().zip(&whitening.blocks);
         for (block, weights) in blocks.filter(|(block, _)| block.camera == camera) {
-            for (seen, &w) in block.observations.iter().zip(weights) {
-                let point = problem.camera_point(block, seen);
+            for (point, &w) in problem.camera_points(block).zip(weights) {
                 let Some(at) = lens.project_with_derivatives(point) else { continue };
                 let pull = by_motion(&at, point).transpose() * information(w);
                 motion += pull * by_motion(&at, point);

@@ -420,8 +420,8 @@ impl Equations<'_> {
             let rotation =
                 unknowns.camera_from_rig.rotation * problem.frames[frame].rotation * panel.rotation;
             let panel_from_camera = DMat3::from_quat(rotation.conjugate());
-            for (seen, &w) in block.observations.iter().zip(weights) {
-                let point = problem.camera_point(block, seen);
+            let seen = block.observations.iter().zip(weights).zip(problem.camera_points(block));
+            for ((seen, &w), point) in seen {
                 let Some(at) = lens.project_with_derivatives(point) else { continue };
                 let residual = seen.pixel - at.pixel;
                 if whitening.is_outlier(w, residual) {
