@@ -68,15 +68,25 @@ impl Whitening {
             whitening.sigma = whitening.median_sigma(problem, residuals);
             whitening
         };
-        let alone = with(0.0);
-        if alone.sigma <= 1.0 {
-            return alone;
+        // Whether sigma exceeds 1: whether the median of rᵀ(Σ + c²)⁻¹r exceeds a limit.
+        let limit = MEDIAN_OF_CHI_SQUARED_2 * left_free(problem);
+        let is_too_small = |common: f64| {
+            let all = covariances.iter().flatten().zip(residuals.iter().flatten());
+            let count = all.clone().count();
+            let within = all.filter(|&(&[xx, xy, yy], &DVec2 { x, y })| {
+                let (xx, yy) = (xx + common * common, yy + common * common);
+                x * x * yy - 2.0 * x * y * xy + y * y * xx <= limit * (xx * yy - xy * xy)
+            });
+            within.count() <= count / 2
+        };
+        if !is_too_small(0.0) {
+            return with(0.0);
         }
         // With the standard deviation of all residuals as the common one, sigma is below 1.
         let (mut low, mut high) = (0.0, Self::equal(problem, residuals).sigma);
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
-            *(if with(middle).sigma > 1.0 { &mut low } else { &mut high }) = middle;
+            *(if is_too_small(middle) { &mut low } else { &mut high }) = middle;
         }
         with(high)
     }
