@@ -310,7 +310,7 @@ impl Gross {
 
 /// The median length of the residuals, px.
 fn median_px<'a>(residuals: impl IntoIterator<Item = &'a DVec2>) -> f64 {
-    median(residuals.into_iter().map(|r| r.x.hypot(r.y)).collect()).unwrap_or(0.0)
+    median(residuals.into_iter().map(|r| r.length()).collect()).unwrap_or(0.0)
 }
 
 /// The median residual beyond which corners contradict the others, px, from the medians of all images.
@@ -321,7 +321,7 @@ fn limit_px(medians: &[f64]) -> f64 {
 /// The lower quartile of the lengths of the residuals, px. With wrong labels, not even a quarter of
 /// the corners fit.
 fn nearest_px(residuals: &[DVec2]) -> f64 {
-    let mut off: Vec<f64> = residuals.iter().map(|r| r.x.hypot(r.y)).collect();
+    let mut off: Vec<f64> = residuals.iter().map(|r| r.length()).collect();
     off.sort_by(f64::total_cmp);
     off.get(off.len() / 4).copied().unwrap_or(f64::INFINITY)
 }
@@ -385,8 +385,7 @@ fn reestimate_pose(problem: &mut Problem, frame: usize, wrong: &BTreeSet<PanelRe
     let off_px = |problem: &Problem| {
         let blocks = problem.blocks.iter().filter(is_right);
         let residuals = blocks.flat_map(|block| problem.residuals(block));
-        median(residuals.map(|r| r.map_or(f64::INFINITY, |r| r.x.hypot(r.y))).collect())
-            .unwrap_or(0.0)
+        median(residuals.map(|r| r.map_or(f64::INFINITY, |r| r.length())).collect()).unwrap_or(0.0)
     };
     let blocks = problem.blocks.iter().filter(is_right);
     let Some(largest) = blocks.clone().max_by_key(|block| block.observations.len()) else { return };

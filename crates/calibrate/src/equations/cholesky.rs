@@ -34,16 +34,15 @@ pub(super) fn cholesky(mut matrix: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
 }
 
 /// The inverse of a symmetric matrix from its factor L: the square of L⁻¹.
-pub(super) fn inverse(factor: &Cholesky<f64, Dyn>) -> DMatrix<f64> {
-    let lower = factor.l_dirty();
-    let n = lower.nrows();
-    let mut root = DMatrix::zeros(n, n);
+pub(super) fn inverse(factor: Cholesky<f64, Dyn>) -> DMatrix<f64> {
+    let mut root = factor.unpack();
+    let n = root.nrows();
     for (first, count) in blocks(n) {
         let (above, mut own) = root.rows_range_pair_mut(..first, first..first + count);
-        let across = lower.view((first, 0), (count, first));
+        let across = own.columns(0, first).into_owned();
+        let own_lower = own.columns(first, count).into_owned();
         own.columns_mut(0, first).gemm(-1.0, &across, &above.columns(0, first), 0.0);
         own.columns_mut(first, count).fill_with_identity();
-        let own_lower = lower.view((first, first), (count, count));
         own_lower.solve_lower_triangular_mut(&mut own.columns_mut(0, first + count));
     }
     let turned = root.transpose();
@@ -77,6 +76,22 @@ pub(super) fn subtract_product(
     });
 }
 
+/// The product of the lower triangle of a symmetric matrix, with half of its diagonal, with another matrix. With L this
+/// triangle, XᵀSX = XᵀLX + (XᵀLX)ᵀ takes half as long as from S.
+pub(super) fn half_product(symmetric: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = symmetric.nrows();
+    let mut product = DMatrix::zeros(n, right.ncols());
+    for (first, count) in blocks(n) {
+        let mut own = product.rows_mut(first, count);
+        let left = symmetric.view((first, 0), (count, first));
+        own.gemm(1.0, &left, &right.rows(0, first), 0.0);
+        let mut lower = symmetric.view((first, first), (count, count)).lower_triangle();
+        (0..count).for_each(|i| lower[(i, i)] *= 0.5);
+        own.gemm(1.0, &lower, &right.rows(first, count), 1.0);
+    }
+    product
+}
+
 /// Copies the blocks of a symmetric matrix from below its diagonal to above it.
 pub(super) fn fill_upper_blocks(matrix: &mut DMatrix<f64>) {
     let n = matrix.nrows();
@@ -106,13 +121,19 @@ mod tests {
                 (&matrix - &whole).iter().fold(0.0, |most: f64, v| most.max(v.abs())) < 1e-12,
                 "product of {n}"
             );
-            let (found, expected) = (cholesky(matrix).unwrap(), whole.cholesky().unwrap());
+            let (found, expected) = (cholesky(matrix.clone()).unwrap(), whole.cholesky().unwrap());
             assert!(
                 (found.l() - expected.l()).iter().fold(0.0, |most: f64, v| most.max(v.abs()))
                     < 1e-11,
                 "factor of {n}"
             );
-            let off = inverse(&found) - expected.inverse();
+            let product = half.tr_mul(&half_product(&matrix, &half));
+            let off = &product + product.transpose() - half.tr_mul(&(&matrix * &half));
+            assert!(
+                off.iter().fold(0.0, |most: f64, v| most.max(v.abs())) < 1e-9 * (1 + n * n) as f64,
+                "half product of {n}"
+            );
+            let off = inverse(found) - expected.inverse();
             assert!(
                 off.iter().fold(0.0, |most: f64, v| most.max(v.abs())) < 1e-11,
                 "inverse of {n}"

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix};
 use rayon::prelude::*;
 
-use super::cholesky::{cholesky, inverse};
+use super::cholesky::{cholesky, half_product, inverse};
 use super::layout::Layout;
 use super::normal::{Normal, PARTS_AT_A_TIME, Part, Reduced};
 
@@ -74,12 +74,12 @@ impl Normal {
         let firsts: Vec<usize> = (0..inverses.len()).step_by(PARTS_AT_A_TIME).collect();
         let some_parts = |first: usize| {
             let some = first..(first + PARTS_AT_A_TIME).min(inverses.len());
-            let through = self.through(&inverses, some.clone());
-            let carried = &kept * &through;
+            let [_, through] = self.through(&inverses, some.clone());
+            let carried = half_product(&kept, &through);
             let of_part = |(index, inverse): (usize, &DMatrix<f64>)| {
                 let (first, size) = (index * inverse.nrows(), inverse.nrows());
-                let carried = carried.columns(first, size);
-                inverse + through.columns(first, size).tr_mul(&carried)
+                let half = through.columns(first, size).tr_mul(&carried.columns(first, size));
+                inverse + &half + half.transpose()
             };
             inverses[some].iter().enumerate().map(of_part).collect::<Vec<_>>()
         };
@@ -99,7 +99,7 @@ impl Normal {
         let n = matrix.nrows();
         let scale = DVector::from_fn(n, |i, _| 1.0 / matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt());
         let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
-        let inverse = inverse(&cholesky(scaled)?);
+        let inverse = inverse(cholesky(scaled)?);
         Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
     }
 
@@ -120,12 +120,22 @@ impl Normal {
         self.solve_parts(&mut of_parts)?;
         let mut of_kept = DMatrix::zeros(layout.count, right.ncols());
         of_kept.rows_mut(0, shared).copy_from(&right.rows(0, shared));
-        of_kept.gemm(-1.0, &self.b, &of_parts, 1.0);
-        let kept = &found.kept * of_kept;
-        let mut carried = (kept.transpose() * &self.b).transpose();
+        let each = || {
+            let parts = (0..self.parts.len()).step_by(PARTS_AT_A_TIME);
+            let parts = parts.map(|first| first..(first + PARTS_AT_A_TIME).min(self.parts.len()));
+            parts.map(|parts| (3 * parts.start, self.b.between(parts)))
+        };
+        for (first, between) in each() {
+            of_kept.gemm(-1.0, &between, &of_parts.rows(first, between.ncols()), 1.0);
+        }
+        let kept = (&found.kept * of_kept).transpose();
+        let mut carried = DMatrix::zeros(of_parts.nrows(), right.ncols());
+        for (first, between) in each() {
+            carried.rows_mut(first, between.ncols()).tr_copy_from(&(&kept * &between));
+        }
         self.solve_parts(&mut carried)?;
         let mut solution = right.clone();
-        solution.rows_mut(0, shared).copy_from(&kept.rows(0, shared));
+        solution.rows_mut(0, shared).tr_copy_from(&kept.columns(0, shared));
         solution.rows_mut(shared, carried.nrows()).copy_from(&(of_parts - carried));
         Some(solution)
     }
@@ -148,10 +158,12 @@ impl Normal {
             return Some(self.invert_shared(reduced));
         }
         let own = reduced.view((shared, shared), (others, others)).into_owned();
-        let own = inverse(&cholesky(own)?);
-        let across = reduced.view((shared, 0), (others, shared));
-        let through = &own * across;
-        let of_shared = reduced.view((0, 0), (shared, shared)) - across.tr_mul(&through);
+        let across = reduced.view((shared, 0), (others, shared)).into_owned();
+        let of_shared = reduced.view((0, 0), (shared, shared)).into_owned();
+        drop(reduced);
+        let mut own = inverse(cholesky(own)?);
+        let through = &own * &across;
+        let of_shared = of_shared - across.tr_mul(&through);
         let found = self.invert_shared(of_shared);
         let of_shared = &found.matrix;
         let carried = &through * of_shared;
@@ -159,7 +171,7 @@ impl Normal {
         inverse.view_mut((0, 0), (shared, shared)).copy_from(of_shared);
         inverse.view_mut((shared, 0), (others, shared)).copy_from(&-&carried);
         inverse.view_mut((0, shared), (shared, others)).copy_from(&-carried.transpose());
-        let own = own + carried * through.transpose();
+        own.gemm(1.0, &carried, &through.transpose(), 1.0);
         inverse.view_mut((shared, shared), (others, others)).copy_from(&own);
         Some(Inverse { matrix: inverse, ..found })
     }

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector, Dyn};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
 use super::cholesky::cholesky;
@@ -18,8 +18,9 @@ use deltille_core::damping::Damping;
 /// Number of parts whose coupling fits into the cache of a processor, if the equations are large.
 const PARTS_IN_CACHE: usize = 16;
 
-/// Relative accuracy of a step from the factor of similar equations, in standard deviations.
-const ACCURACY: f64 = 1e-10;
+/// Relative accuracy of a step from the factor of similar equations, in standard deviations. Later steps correct the
+/// error, and the last one is shorter than a standard deviation.
+const ACCURACY: f64 = 1e-6;
 
 /// Maximum number of iterations to this accuracy; more take longer than a factor. From one step to the next, five to
 /// ten are needed.
@@ -77,9 +78,10 @@ impl Normal {
                 kept
             }
         };
+        let carried = self.b.tr_times(0..self.parts.len(), &kept);
         let parts = self.parts.iter().zip(inverses).enumerate();
         let parts = parts.map(|(index, (part, inverse))| {
-            inverse * (&part.right - self.between(index..index + 1).tr_mul(&kept))
+            inverse * (&part.right - carried.rows(part.right.len() * index, part.right.len()))
         });
         let (frames, corners) = layout.split(&kept, &parts.collect::<Vec<_>>());
         let shared = kept.rows(0, self.shared).into_owned();
@@ -95,14 +97,14 @@ impl Normal {
         damping: Damping,
         inverses: &[DMatrix<f64>],
     ) -> Option<DVector<f64>> {
-        let of_parts = |parts: Range<usize>, _: DMatrixView<f64>| {
+        let of_parts = |parts: Range<usize>| {
             let rights = self.parts[parts].iter().flat_map(|part| part.right.iter().copied());
             DVector::from_vec(rights.collect())
         };
         let mut left = &self.right - self.carried(inverses, of_parts);
         let diagonal = self.a.diagonal().map(|value| damping.grown(value) - value);
         let times = |vector: &DVector<f64>| {
-            let eliminated = self.carried(inverses, |_, between| between.tr_mul(vector));
+            let eliminated = self.carried(inverses, |parts| self.b.tr_times(parts, vector));
             &self.a * vector + diagonal.component_mul(vector) - eliminated
         };
         let mut kept = DVector::zeros(left.len());
@@ -131,21 +133,20 @@ impl Normal {
     fn carried(
         &self,
         inverses: &[DMatrix<f64>],
-        of_parts: impl Fn(Range<usize>, DMatrixView<f64>) -> DVector<f64> + Sync,
+        of_parts: impl Fn(Range<usize>) -> DVector<f64> + Sync,
     ) -> DVector<f64> {
         let count = self.parts.len();
         let firsts: Vec<usize> = (0..count).step_by(PARTS_IN_CACHE).collect();
         let terms = firsts.into_par_iter().map(|first| {
             let parts = first..(first + PARTS_IN_CACHE).min(count);
-            let between = self.between(parts.clone());
-            let mut of_parts = of_parts(parts.clone(), between);
-            for (index, inverse) in inverses[parts].iter().enumerate() {
+            let mut of_parts = of_parts(parts.clone());
+            for (index, inverse) in inverses[parts.clone()].iter().enumerate() {
                 let size = inverse.nrows();
                 let mut own = of_parts.rows_mut(size * index, size);
                 let solved = inverse * &own;
                 own.copy_from(&solved);
             }
-            between * of_parts
+            self.b.times(parts, &of_parts)
         });
         let terms: Vec<DVector<f64>> = terms.collect();
         terms.iter().fold(DVector::zeros(self.right.len()), |sum, term| sum + term)

@@ -11,6 +11,7 @@
 
 pub(crate) mod block;
 mod cholesky;
+mod coupling;
 pub(crate) mod covariances;
 pub(crate) mod factor;
 pub(crate) mod frame;

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::corner_map::CornerMap;
+use super::corner_map::{CornerMap, MappedCorner};
 use super::shape::Shape;
 use super::unknowns::{Block, CameraUnknowns, PanelUnknowns, TargetUnknowns};
 use crate::cancel::Stop;
@@ -59,6 +59,19 @@ impl Problem {
             let moved = index.map_or(DVec3::ZERO, |(map, index)| map.offsets_mm[index]);
             seen.panel_mm + bent + moved
         })
+    }
+
+    /// The positions of all corners of the map in the scene, mm.
+    pub(crate) fn scene_points(&self) -> Vec<DVec3> {
+        let of_corner = |(corner, offset): (&MappedCorner, &DVec3)| {
+            let bent = self.shape.map_or(DVec3::ZERO, |shape| shape.offset(corner.panel_mm));
+            self.scene_from_panel(corner.panel).apply(corner.panel_mm + bent + *offset)
+        };
+        self.map
+            .iter()
+            .flat_map(|map| map.corners.iter().zip(&map.offsets_mm))
+            .map(of_corner)
+            .collect()
     }
 
     /// The positions of the corners of a block in the frame of its camera, mm.

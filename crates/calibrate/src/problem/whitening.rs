@@ -40,7 +40,7 @@ impl Whitening {
     /// Whether a corner is an outlier.
     pub(crate) fn is_outlier(&self, weight: [f64; 3], residual: DVec2) -> bool {
         let off = Self::apply(weight, residual);
-        off.x.hypot(off.y) > self.outlier_limit()
+        off.length() > self.outlier_limit()
     }
 
     /// The whitened distance beyond which a corner is an outlier.
@@ -169,7 +169,7 @@ pub(crate) fn deviations(problem: &Problem, whitening: &Whitening) -> Vec<Vec<f6
     let of_block = |(block, weights): (&Block, &Vec<[f64; 3]>)| {
         let off = problem.residuals(block).zip(weights).map(|(off, &w)| {
             let off = Whitening::apply(w, off?);
-            Some(off.x.hypot(off.y))
+            Some(off.length())
         });
         off.map(|off| off.unwrap_or(f64::INFINITY)).collect()
     };

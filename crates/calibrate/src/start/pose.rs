@@ -64,7 +64,7 @@ pub(super) fn median_off_px(
         let camera_from_panel = pose.after(&panels[sighting.panel.index()]);
         sighting.observations.iter().map(move |seen| {
             let at = camera.project(camera_from_panel.apply(seen.panel_mm));
-            at.map(|at| seen.pixel - at).map_or(f64::INFINITY, |off| off.x.hypot(off.y))
+            at.map(|at| seen.pixel - at).map_or(f64::INFINITY, |off| off.length())
         })
     });
     median(off.collect()).unwrap_or(0.0)
