@@ -22,6 +22,7 @@
 //! | 6 | [`limits`] | limits on the resources that a file may use, and handling of panics in
 //! third-party code | `deltille-files` |
 //! | 6 | [`photograph`] | images in any common format | |
+//! | 7 | [`frames`] | frames of photographs, videos and recordings | `deltille-frames` |
 //! | 6 | [`export`] | writing and reading of artwork, targets and results | |
 //! | 6 | [`report`] | calibration reports as HTML | |
 //! | 7 | [`verify`] | comparison of artifacts with their target | `deltille-verify` |
@@ -37,6 +38,8 @@ pub use deltille_core::{Clock, Name, camera, glam, lattice, raster, setting, tar
 pub use deltille_files::logo;
 #[cfg(feature = "report")]
 pub use deltille_files::report;
+#[cfg(any(feature = "recordings", feature = "videos"))]
+pub use deltille_frames as frames;
 #[cfg(feature = "files")]
 pub use deltille_files::{SheetUseError, camera_file, clock, export, limits, target_file};
 #[cfg(feature = "photographs")]

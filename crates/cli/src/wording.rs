@@ -43,6 +43,7 @@ const fn named(setting: Setting) -> (&'static str, &'static str) {
         Setting::FamilyToJson => ("deltag gen-family", ""),
         Setting::FinishContour => ("deltille board", "--contour"),
         Setting::FinishWhite => ("deltille board", "--white"),
+        Setting::FrameOptionsTopic => ("deltille detect", "--topic"),
         Setting::ImportBits => ("deltag import", "--bits"),
         Setting::ImportDistance => ("deltag import", "--distance"),
         Setting::ImportKind => ("deltag import", "--shape"),

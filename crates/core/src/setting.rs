@@ -61,6 +61,7 @@ settings! {
     DialectFork = "Dialect::Fork",
     FamilyShippedNames = "family::shipped_names",
     FamilyToJson = "Family::to_json",
+    FrameOptionsTopic = "FrameOptions::topic",
     FinishContour = "Finish::contour",
     FinishWhite = "Finish::white",
     ImportBits = "ImportSpec::bits",

@@ -238,6 +238,16 @@ pub fn pixels(path: &Path, limits: &Limits) -> Option<u64> {
     Some(u64::from(width) * u64::from(height))
 }
 
+/// Returns the number of pixels that the header of a file's content states; `None` if it cannot be read.
+pub fn pixels_of(bytes: &[u8]) -> Option<u64> {
+    let dimensions = || {
+        let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().ok()?;
+        reader.into_dimensions().ok()
+    };
+    let (width, height) = limits::caught(dimensions).ok()??;
+    Some(u64::from(width) * u64::from(height))
+}
+
 /// An input of decoders.
 trait Source: BufRead + Seek {}
 

@@ -61,6 +61,7 @@ pub fn keyword(setting: Setting) -> String {
         Setting::FamilyToJson => "Family.to_json",
         Setting::FinishContour => "contour",
         Setting::FinishWhite => "white",
+        Setting::FrameOptionsTopic => "topic",
         Setting::ImportBits => "bits",
         Setting::ImportDistance => "distance",
         Setting::ImportKind => "kind",

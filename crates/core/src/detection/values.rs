@@ -18,6 +18,10 @@ use crate::targets::TargetIdentity;
 pub struct Detection {
     /// File name of the image, or any name that the caller gave to it.
     pub image: String,
+    /// Time stamp of a frame of a recording or video, ns: since 1970 or the start of a robot's clock, or since the start of
+    /// the video.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_ns: Option<i64>,
     /// Width of the image, px.
     pub width: u32,
     /// Height of the image, px.

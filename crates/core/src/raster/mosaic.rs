@@ -186,8 +186,9 @@ impl<T: Intensity + TryFrom<u32> + Ord> Colours<'_, T> {
         sums[1] / sums[0]
     }
 
-    /// Returns the measured values, with red and blue multiplied by the ratio of green to them in the vicinity.
-    fn levelled(&self, red: [usize; 2]) -> Gray<T> {
+    /// Returns the values that a Bayer sensor measured, with red and blue multiplied by the ratio of green to them in the
+    /// vicinity. `red` is the column and row of red in the mosaic, 0 or 1.
+    pub fn levelled(&self, red: [usize; 2]) -> Gray<T> {
         let levels = self.levels();
         let white = T::try_from(T::FULL_SCALE as u32).unwrap_or_default();
         let [across, down] = self.in_levels();

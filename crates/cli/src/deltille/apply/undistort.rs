@@ -24,6 +24,7 @@ use deltille::camera::{Camera, CameraFile, Field, PixelMap, Rectification, Undis
 use deltille::export::camera::{opencv, ros};
 use deltille::export::kind::{Kind, signed_png};
 use deltille::export::{atomic, saved, undistortion};
+use deltille::frames::Frame;
 use deltille::limits::Limits;
 use deltille::photograph;
 use deltille::remap::remapped;
@@ -240,12 +241,12 @@ impl Pictures<'_> {
         images_at_once::for_each(
             &pool,
             &self.args.limits.limits(),
-            images.iter(),
+            images.iter().map(|image| image.map(Frame::photograph)),
             |index, image| {
                 if interrupt::is_raised() {
                     return;
                 }
-                match image.and_then(|image| self.write_one(&image, map)) {
+                match image.and_then(|image| self.write_one(image.path(), map)) {
                     Ok(()) => *done.lock().expect("no thread panics here") += 1,
                     Err(error) => {
                         failed.lock().expect("no thread panics here").insert(index, error);

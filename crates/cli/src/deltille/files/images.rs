@@ -1,35 +1,69 @@
-//! Input images of a command: files, folders, patterns, and lists on standard input.
+//! Input images of a command: files, folders, patterns, recordings, and lists on standard input.
 
 use std::collections::BTreeMap;
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, anyhow, bail};
 
-/// Extensions of the files used from a folder; files named directly may have any extension.
-const EXTENSIONS: [&str; 11] =
-    ["png", "jpg", "jpeg", "tif", "tiff", "bmp", "pgm", "ppm", "pnm", "pbm", "webp"];
+use crate::output::log;
+use crate::values::whole;
+use deltille::frames::{self, Frame, FrameOptions, Frames, FramesError, is_recording};
+use deltille::limits::Limits;
+use deltille_core::words::counted;
 
 /// The error of an empty list.
 const NO_LIST: &str = "-: standard input contains no file names; write one path per line";
 
+/// Options for recordings.
+#[derive(clap::Args)]
+pub struct RecordingArgs {
+    /// Topic of the images in an MCAP file or a bag; needed if several topics contain images
+    #[arg(long, value_name = "TOPIC")]
+    topic: Option<String>,
+    /// Read only every N-th frame of videos, MCAP files and bags
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1..=1_000_000u64))]
+    every: u64,
+}
+
+impl RecordingArgs {
+    /// Returns the options with these limits.
+    pub fn options(&self, limits: Limits) -> FrameOptions {
+        let mut options = FrameOptions::default();
+        options.topic.clone_from(&self.topic);
+        options.every = self.every;
+        options.limits = limits;
+        options
+    }
+}
+
 /// Images in the order of the arguments; a list on standard input is read as it arrives.
 pub struct Images {
     named: Vec<PathBuf>,
-    /// Index in `named` before which the list on standard input is inserted.
-    listed: Option<usize>,
+    /// The list on standard input, if it is among the arguments.
+    listed: Option<List>,
+}
+
+/// A list on standard input.
+struct List {
+    /// Number of named images before it.
+    after: usize,
+    /// The lines, once they were read.
+    read: Mutex<Vec<PathBuf>>,
 }
 
 impl Images {
-    /// Expands folders and patterns.
+    /// Expands folders and patterns. Folders of bags and recordings are images until [`frames`](Self::frames) opens them.
     pub fn of(arguments: &[PathBuf]) -> anyhow::Result<Self> {
         let mut images = Self { named: Vec::new(), listed: None };
         for argument in arguments {
             if argument.as_os_str() == "-" {
-                if images.listed.replace(images.named.len()).is_some() {
+                let list = List { after: images.named.len(), read: Mutex::default() };
+                if images.listed.replace(list).is_some() {
                     bail!("-: standard input is given twice");
                 }
-            } else if argument.is_dir() {
+            } else if argument.is_dir() && !is_recording(argument) {
                 images.named.extend(in_folder(argument)?);
             } else if argument.exists() {
                 images.named.push(argument.clone());
@@ -40,60 +74,113 @@ impl Images {
         Ok(images)
     }
 
-    /// Returns the images that are known in advance.
+    /// Returns the photographs and recordings that are known in advance.
     pub fn named(&self) -> &[PathBuf] {
         &self.named
     }
 
     /// Returns the number of images, if known.
     pub fn count(&self) -> Option<usize> {
-        self.listed.is_none().then_some(self.named.len())
+        let is_known = self.listed.is_none() && !self.named.iter().any(|path| is_recording(path));
+        is_known.then_some(self.named.len())
     }
 
-    /// Iterates over all images; an unreadable line ends the list with an error.
+    /// Whether there is a single photograph or recording.
+    pub fn is_single(&self) -> bool {
+        self.listed.is_none() && self.named.len() == 1
+    }
+
+    /// Iterates over all paths; an unreadable line ends the list with an error.
     pub fn iter(&self) -> impl Iterator<Item = anyhow::Result<PathBuf>> + Send + '_ {
-        let (before, after) = self.named.split_at(self.listed.unwrap_or(0));
-        let lines = self.listed.map(|_| std::io::BufReader::new(std::io::stdin()).lines());
-        let mut listed = lines.into_iter().flatten().filter_map(|line| match line {
-            Ok(line) if line.trim().is_empty() => None,
-            Ok(line) => Some(Ok(PathBuf::from(line.trim_end_matches('\r')))),
-            Err(error) => Some(Err(error).context("-: the list on standard input")),
-        });
-        let mut is_empty = self.listed.is_some();
-        let listed = std::iter::from_fn(move || {
-            let next = listed.next();
-            let is_missing = std::mem::replace(&mut is_empty, false) && next.is_none();
-            if is_missing { Some(Err(anyhow!(NO_LIST))) } else { next }
-        });
+        let after = self.listed.as_ref().map_or(0, |list| list.after);
+        let (before, after) = self.named.split_at(after);
+        let listed = self.listed.iter().flat_map(List::iter);
         before.iter().cloned().map(Ok).chain(listed).chain(after.iter().cloned().map(Ok))
+    }
+
+    /// Iterates over the frames of all images. The first pass notes recordings that end early.
+    pub fn frames<'a>(
+        &'a self,
+        options: &'a FrameOptions,
+        is_first_pass: bool,
+    ) -> impl Iterator<Item = anyhow::Result<Frame>> + Send + 'a {
+        let opened =
+            self.iter().flat_map(move |path| match path.map(|path| of_path(path, options)) {
+                Ok(frames) => frames,
+                Err(error) => Box::new(std::iter::once(Err(error))),
+            });
+        opened.filter(move |frame| {
+            let error = frame.as_ref().err().and_then(|error| error.downcast_ref());
+            let Some(early @ FramesError::Incomplete { .. }) = error else { return true };
+            if is_first_pass {
+                log!("note: {early}");
+            }
+            false
+        })
     }
 }
 
-/// Returns the images directly inside a folder, sorted by name; fails if there are none.
+impl List {
+    fn iter(&self) -> Box<dyn Iterator<Item = anyhow::Result<PathBuf>> + Send + '_> {
+        let read = || self.read.lock().unwrap_or_else(PoisonError::into_inner);
+        let again = read().clone();
+        if !again.is_empty() {
+            return Box::new(again.into_iter().map(Ok));
+        }
+        let lines = std::io::BufReader::new(std::io::stdin()).lines();
+        let mut paths = lines.filter_map(move |line| match line {
+            Ok(line) if line.trim().is_empty() => None,
+            Ok(line) => {
+                let path = PathBuf::from(line.trim_end_matches('\r'));
+                read().push(path.clone());
+                Some(Ok(path))
+            }
+            Err(error) => Some(Err(error).context("-: the list on standard input")),
+        });
+        let mut is_empty = true;
+        Box::new(std::iter::from_fn(move || {
+            let next = paths.next();
+            let is_missing = std::mem::replace(&mut is_empty, false) && next.is_none();
+            if is_missing { Some(Err(anyhow!(NO_LIST))) } else { next }
+        }))
+    }
+}
+
+/// Opens a path that is not a folder of photographs.
+fn of_path(
+    path: PathBuf,
+    options: &FrameOptions,
+) -> Box<dyn Iterator<Item = anyhow::Result<Frame>> + Send> {
+    match Frames::open(path, options) {
+        Ok(frames) => Box::new(frames.map(|frame| Ok(frame?))),
+        Err(error) => Box::new(std::iter::once(Err(error.into()))),
+    }
+}
+
+/// Returns the images directly inside a folder, sorted by name; fails if there are none. Notes files that are not read.
 fn in_folder(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let images = photographs_in(folder)?;
+    let unread = frames::unread_in(folder).unwrap_or_default();
+    let [first, ..] = unread.as_slice() else {
+        if images.is_empty() {
+            return Err(FramesError::EmptyFolder { path: folder.to_owned() }.into());
+        }
+        return Ok(images);
+    };
+    let skipped = format!("{} such as {}", counted(unread.len(), "file"), first.display());
     if images.is_empty() {
-        bail!("{}: no PNG, JPEG, TIFF, BMP, PGM or WebP file in this folder", folder.display());
+        bail!(
+            "{}: no photograph that can be read, but {skipped}; recordings are given by name",
+            folder.display()
+        );
     }
+    log!("note: {skipped} not read; recordings are given by name");
     Ok(images)
 }
 
 /// Returns the images directly inside a folder, sorted by name; may be empty.
 pub fn photographs_in(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder);
-    let entries = entries.with_context(|| format!("cannot read {}", folder.display()))?;
-    let mut images = Vec::new();
-    for entry in entries {
-        let path = entry.with_context(|| format!("cannot read {}", folder.display()))?.path();
-        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        // Overlays drawn by an earlier run are not photographs.
-        let drawn = path.to_string_lossy().ends_with(".overlay.jpg");
-        if extension.is_some_and(|e| EXTENSIONS.contains(&e.as_str())) && !drawn && path.is_file() {
-            images.push(path);
-        }
-    }
-    images.sort();
-    Ok(images)
+    frames::photographs_in(folder).with_context(|| format!("cannot read {}", folder.display()))
 }
 
 /// Returns the files that match a pattern with `*`, `?` or `[…]`. Other arguments are returned unchanged; errors are
@@ -128,13 +215,19 @@ impl Stems {
     /// Returns the stem of an image's result files; fails if another image has the same.
     pub fn claim(&mut self, image: &Path) -> anyhow::Result<String> {
         let stem = stem(image)?;
-        if let Some(other) = self.taken.insert(stem.clone(), image.to_owned()) {
+        self.claim_stem(&stem, image)?;
+        Ok(stem)
+    }
+
+    /// Fails if another image has the same stem.
+    pub fn claim_stem(&mut self, stem: &str, image: &Path) -> anyhow::Result<()> {
+        if let Some(other) = self.taken.insert(stem.to_owned(), image.to_owned()) {
             bail!(
                 "{} and {} would both be written as {stem}; process them separately with different -o folders",
                 other.display(),
                 image.display()
             );
         }
-        Ok(stem)
+        Ok(())
     }
 }

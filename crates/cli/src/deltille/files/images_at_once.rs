@@ -1,22 +1,21 @@
 //! Parallel processing of images, limited by threads and by total pixels.
 
-use std::path::PathBuf;
 use std::sync::{Condvar, Mutex, MutexGuard};
 
 use rayon::ThreadPool;
 
+use deltille::frames::Frame;
 use deltille::limits::Limits;
-use deltille::photograph;
 
-/// Calls a function with each image and its index, on the threads of a pool. Images in memory together have no more
+/// Calls a function with each frame and its index, on the threads of a pool. Images in memory together have no more
 /// pixels than the limit for one.
 pub fn for_each(
     pool: &ThreadPool,
     limits: &Limits,
-    images: impl Iterator<Item = anyhow::Result<PathBuf>> + Send,
-    work: impl Fn(usize, anyhow::Result<PathBuf>) + Sync,
+    frames: impl Iterator<Item = anyhow::Result<Frame>> + Send,
+    work: impl Fn(usize, anyhow::Result<Frame>) + Sync,
 ) {
-    let images = Mutex::new(images.enumerate());
+    let frames = Mutex::new(frames.enumerate());
     let memory = Memory { most: limits.max_pixels, used: Mutex::default(), freed: Condvar::new() };
     // The threads of the pool never wait for memory: a waiting thread would delay other images,
     // because each thread also works on parts of these.
@@ -24,12 +23,11 @@ pub fn for_each(
         for _ in 0..pool.current_num_threads() {
             scope.spawn(|| {
                 loop {
-                    let next = images.lock().expect("no iterator panics").next();
-                    let Some((index, image)) = next else { return };
-                    let pixels =
-                        image.as_ref().ok().and_then(|path| photograph::pixels(path, limits));
+                    let next = frames.lock().expect("no iterator panics").next();
+                    let Some((index, frame)) = next else { return };
+                    let pixels = frame.as_ref().ok().and_then(|frame| frame.pixels(limits));
                     let _taken = memory.take(pixels.unwrap_or(limits.max_pixels));
-                    pool.install(|| work(index, image));
+                    pool.install(|| work(index, frame));
                 }
             });
         }

@@ -10,7 +10,7 @@ use anyhow::{Context, bail};
 
 use super::detector_options::FinderArgs;
 use crate::deltille::files::detection_tables::{self, Tables};
-use crate::deltille::files::images::{self, Images, Stems};
+use crate::deltille::files::images::{Images, RecordingArgs, Stems};
 use crate::deltille::files::images_at_once;
 use crate::output::{self, Overwrite, log};
 use crate::run::{self, BAD_INPUT, FAILED, Interrupted};
@@ -22,7 +22,8 @@ use deltille::export::kind::Kind;
 use deltille::export::named::Format;
 use deltille::export::tables::ImageRecord;
 use deltille::export::{DETECTION_FORMATS, DetectionFormat, atomic, detection, overlay};
-use deltille::photograph::{self, Photograph};
+use deltille::frames::{Frame, is_recording};
+use deltille::photograph::Photograph;
 use deltille::raster::AnyGray;
 use deltille::targets::Target;
 use deltille_core::words::{counted, shown};
@@ -30,10 +31,13 @@ use deltille_core::words::{counted, shown};
 /// Arguments of `deltille detect`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Photographs (PNG, JPEG, TIFF, BMP, PGM or WebP): files, folders, patterns such as 'day*/*.png', or - for a
-    /// list on standard input, one path per line
+    /// Photographs (PNG, JPEG, TIFF, BMP, PGM, WebP or HEIC), videos (MP4, MOV, MKV, AVI, WebM or Y4M), MCAP files, and
+    /// bags of ROS 1 or 2: files, folders, patterns such as 'day*/*.png', or - for a list on standard input, one path per
+    /// line
     #[arg(required = true, value_name = "IMAGE")]
     images: Vec<PathBuf>,
+    #[command(flatten)]
+    recording: RecordingArgs,
     #[command(flatten)]
     finder: FinderArgs,
     /// Output folder; result files are named after the images [default: current folder]
@@ -54,9 +58,9 @@ pub struct Args {
     /// none
     #[arg(long)]
     stream: bool,
-    /// The images are successive frames of a video, as listed or sorted by name: follow the targets from frame to frame,
-    /// one frame at a time, in less than half of the time of detection (without decoding). The result contains only the tags
-    /// that were read in this frame
+    /// The images are successive frames of a video, as recorded, listed or sorted by name: follow the targets from frame to
+    /// frame, one frame at a time, in less than half of the time of detection (without decoding). The result contains only
+    /// the tags that were read in this frame
     #[arg(long, conflicts_with = "jobs")]
     track: bool,
     /// Accept incomplete JPEG files and note the damage in the result; otherwise they are errors
@@ -114,9 +118,6 @@ struct Found {
 struct Seen {
     /// Index among all images.
     index: usize,
-    image: PathBuf,
-    /// Stem of its result files.
-    stem: String,
     ink: Option<InkEstimate>,
 }
 
@@ -133,7 +134,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let images = Images::of(&args.images)?;
     // Detects name clashes among the named images before the work starts.
     let mut named = Stems::default();
-    for image in images.named() {
+    for image in images.named().iter().filter(|path| !is_recording(path)) {
         args.check_results(&named.claim(image)?)?;
     }
     let new_folder = args.folder().filter(|folder| !folder.exists());
@@ -144,6 +145,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         output::settle(folder).context("-o")?;
     }
     let limits = args.finder.limits();
+    let options = args.recording.options(limits);
     let folder = args.tables();
     let earlier = match folder {
         Some(folder) => {
@@ -173,33 +175,33 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let threads = rayon::ThreadPoolBuilder::new().num_threads(jobs.into());
     // Sequential, so that of two images with the same stem the later one is always rejected.
     let mut stems = Stems::default();
-    let claimed = images.iter().map(|image| {
-        let image = image?;
-        stems.claim(&image)?;
-        Ok(image)
+    let claimed = images.frames(&options, true).map(|frame| {
+        let frame = frame?;
+        stems.claim_stem(&frame.stem(), frame.path())?;
+        Ok(frame)
     });
     let go_on = if args.stream { "" } else { "; resume with --skip-existing" };
-    let report = Report::new(images.count() == Some(1), go_on);
+    let report = Report::new(images.is_single(), go_on);
     let seen: Mutex<Vec<Seen>> = Mutex::default();
     // Rows of images that were not processed, if they have one.
     let unseen: Mutex<Vec<(usize, Option<ImageRecord>)>> = Mutex::default();
     let threads = threads.build()?;
-    images_at_once::for_each(&threads, &limits, claimed, |index, image| {
+    images_at_once::for_each(&threads, &limits, claimed, |index, frame| {
         if interrupt::is_raised() {
             return;
         }
-        let name = image.as_ref().ok().map(|image| name_of(image));
-        let mut result = image.and_then(|image| {
-            let stem = images::stem(&image)?;
+        let name = frame.as_ref().ok().map(Frame::name);
+        let mut result = frame.and_then(|frame| {
+            let stem = frame.stem();
             args.check_results(&stem)?;
             if args.skip_existing
                 && args.results(&stem).iter().all(|(path, _)| path.exists())
-                && (folder.is_none() || done.contains(name_of(&image).as_str()))
+                && (folder.is_none() || done.contains(frame.name().as_str()))
             {
                 return Ok(Outcome::Skipped);
             }
-            let found = one_image(&args, &targets, &finder, &image, &stem)?;
-            let looked_at = Seen { index, image, stem, ink: found.ink };
+            let found = one_image(&args, &targets, &finder, frame)?;
+            let looked_at = Seen { index, ink: found.ink };
             seen.lock().expect("no thread panics here").push(looked_at);
             Ok(Outcome::Seen(Box::new(found)))
         });
@@ -222,7 +224,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         note_ink_of_all(&finder.detector, &seen);
     } else if !interrupt::is_raised() {
         let unseen = unseen.into_inner().expect("no thread panics here");
-        again = see_again(&args, &targets, &finder.detector, &seen, unseen, &threads, &report)?;
+        let frames = images.frames(&options, false);
+        again =
+            see_again(&args, &targets, &finder.detector, &seen, frames, unseen, &threads, &report)?;
     }
     if let Some(tables) = tables {
         let is_left = interrupt::is_raised();
@@ -258,11 +262,13 @@ fn note_ink_of_all(detector: &Detector, seen: &[Seen]) {
 
 /// Processes all images a second time with the joint ink estimate, because a single image may constrain the ink
 /// poorly. Rewrites the tables, with the rows of images that were not processed.
+#[expect(clippy::too_many_arguments, reason = "the state of the first pass")]
 fn see_again(
     args: &Args,
     targets: &[Target],
     detector: &Detector,
     seen: &[Seen],
+    frames: impl Iterator<Item = anyhow::Result<Frame>> + Send,
     unseen: Vec<(usize, Option<ImageRecord>)>,
     threads: &rayon::ThreadPool,
     report: &Report,
@@ -274,26 +280,24 @@ fn see_again(
     if let Some(detector) = detector.with_ink_of(&found) {
         let finder = ImageDetector::of(args, detector);
         let bar = progress::bar(seen.len() as u64, "images, second pass with joint ink estimate");
-        let images = seen.iter().map(|seen| Ok(seen.image.clone()));
+        let mut wanted = seen.iter().map(|seen| seen.index).peekable();
+        let frames = frames.enumerate().filter(|(index, _)| wanted.next_if_eq(index).is_some());
         tables = args.tables().map(|folder| Tables::begin(folder, targets)).transpose()?;
         if let Some(table) = &tables {
             unseen.iter().for_each(|(index, row)| table.add(*index, row.clone()));
         }
-        images_at_once::for_each(threads, &args.finder.limits(), images, |index, _| {
+        let frames = frames.map(|(_, frame)| frame);
+        images_at_once::for_each(threads, &args.finder.limits(), frames, |index, frame| {
             if interrupt::is_raised() {
                 return;
             }
-            let Seen { index, image, stem, .. } = &seen[index];
-            let again = one_image(args, targets, &finder, image, stem);
+            let index = seen[index].index;
+            let name = frame.as_ref().ok().map(Frame::name);
+            let again = frame.and_then(|frame| one_image(args, targets, &finder, frame));
             again.as_ref().err().iter().for_each(|error| bar.suspend(|| report.fail_again(error)));
             if let Some(tables) = &tables {
-                tables.add(
-                    *index,
-                    row_of(
-                        Some(name_of(image)),
-                        &mut again.map(|found| Outcome::Seen(Box::new(found))),
-                    ),
-                );
+                let mut again = again.map(|found| Outcome::Seen(Box::new(found)));
+                tables.add(index, row_of(name, &mut again));
             }
             bar.inc(1);
         });
@@ -301,11 +305,6 @@ fn see_again(
     }
     log!("ink: {ink} ({})", counted(ink.images as usize, "image"));
     Ok(tables)
-}
-
-/// Returns the name of an image in its results.
-fn name_of(image: &Path) -> String {
-    image.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// Returns the table row of an image, if it has one.
@@ -453,14 +452,14 @@ fn one_image(
     args: &Args,
     targets: &[Target],
     finder: &ImageDetector,
-    path: &Path,
-    stem: &str,
+    frame: Frame,
 ) -> anyhow::Result<Found> {
     let limits = args.finder.limits();
-    let Photograph { image, notes } =
-        photograph::read_with_notes(path, &limits, args.accept_damaged)?;
-    let mut found = finder.detect(&image, &name_of(path));
-    found.file = notes;
+    let (place, stem) = (frame.path().to_owned(), frame.stem());
+    let (name, time_ns) = (frame.name(), frame.time_ns());
+    let Photograph { image, notes } = frame.read(&limits, args.accept_damaged)?;
+    let mut found = finder.detect(&image, &name);
+    (found.file, found.time_ns) = (notes, time_ns);
     if let Some(folder) = args.folder() {
         let path = |extension: &str| folder.join(format!("{stem}.{extension}"));
         let text = |format: &&DetectionFormat| {
@@ -473,7 +472,7 @@ fn one_image(
         }
         atomic::write_together(&files)?;
     }
-    let line = if args.stream { detection::write_line(&found) } else { summary(path, &found) };
+    let line = if args.stream { detection::write_line(&found) } else { summary(&place, &found) };
     let is_there = match targets.is_empty() {
         false => found.grids.iter().any(|grid| grid.panel.is_some()),
         true => !found.grids.is_empty(),

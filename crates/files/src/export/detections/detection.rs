@@ -79,6 +79,8 @@ impl From<ReadError> for DetectionFileError {
 struct DetectionFile {
     schema: String,
     image: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    time_ns: Option<i64>,
     #[serde(deserialize_with = "quantity::side_px::de")]
     width: u32,
     #[serde(deserialize_with = "quantity::side_px::de")]
@@ -125,6 +127,7 @@ impl DetectionFile {
     fn of(detection: &Detection) -> Self {
         let Detection {
             image,
+            time_ns,
             width,
             height,
             file,
@@ -139,6 +142,7 @@ impl DetectionFile {
         Self {
             schema: SCHEMA.to_owned(),
             image,
+            time_ns,
             width,
             height,
             file,
@@ -172,6 +176,7 @@ pub fn read(text: &str) -> Result<Detection, DetectionFileError> {
     }
     let DetectionFile {
         image,
+        time_ns,
         width,
         height,
         file,
@@ -185,6 +190,7 @@ pub fn read(text: &str) -> Result<Detection, DetectionFileError> {
     } = json::read(text)?;
     check_corners(&grids)?;
     let mut detection = Detection::new(image, [width, height], grids);
+    detection.time_ns = time_ns;
     (detection.file, detection.targets) = (file, targets);
     (detection.tone, detection.ink) = (tone, ink);
     (detection.reasons, detection.timing_ms) = (reasons, timing_ms);

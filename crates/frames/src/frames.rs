@@ -1,0 +1,162 @@
+//! The frames of a path.
+
+use std::path::{Path, PathBuf};
+
+use deltille_files::limits::Limits;
+
+use crate::content::Content;
+use crate::folder;
+use crate::frame::Frame;
+use crate::problem::{FramesError, Problem};
+
+/// Which frames are read.
+#[derive(Clone, Debug, Default)]
+#[non_exhaustive]
+pub struct FrameOptions {
+    /// The topic of a recording; needed if several contain images.
+    pub topic: Option<String>,
+    /// Number of frames of a recording of which the first is read; 0 and 1 for all.
+    pub every: u64,
+    /// Limits of each image, and of each part of a recording.
+    pub limits: Limits,
+}
+
+impl FrameOptions {
+    /// Sets the topic.
+    #[must_use]
+    pub fn topic(self, topic: impl Into<String>) -> Self {
+        Self { topic: Some(topic.into()), ..self }
+    }
+}
+
+/// An iterator over the frames of a photograph, folder, video or recording.
+///
+/// The last item of a recording that is damaged or was not finished is [`FramesError::Incomplete`].
+pub struct Frames(Kind);
+
+enum Kind {
+    Photographs(std::vec::IntoIter<PathBuf>),
+    Recording(Recording),
+}
+
+/// Time stamps, ns, and contents.
+type Stream = Box<dyn Iterator<Item = Result<(Option<i64>, Content), Problem>> + Send>;
+
+struct Recording {
+    path: PathBuf,
+    /// The frames; `None` after the end.
+    stream: Option<Stream>,
+    /// Number of frames so far.
+    count: u64,
+    every: u64,
+}
+
+impl Frames {
+    /// Opens a path: a photograph; a folder of photographs, sorted by name; a video; MCAP; a bag of ROS 1 or 2.
+    /// Recordings are recognised by their extension.
+    ///
+    /// # Errors
+    /// Returns an error if the recording or folder cannot be read, or if the topic is not known.
+    pub fn open(path: impl AsRef<Path>, options: &FrameOptions) -> Result<Self, FramesError> {
+        let path = path.as_ref();
+        let failed = |problem| FramesError::Recording { path: path.to_owned(), problem };
+        if folder::is_recording(path) {
+            let stream = Some(open(path, options).map_err(failed)?);
+            let every = options.every.max(1);
+            let path = path.to_owned();
+            return Ok(Self(Kind::Recording(Recording { path, stream, count: 0, every })));
+        }
+        if !path.is_dir() {
+            return Ok(Self(Kind::Photographs(vec![path.to_owned()].into_iter())));
+        }
+        let photographs = folder::photographs_in(path).map_err(|error| failed(error.into()))?;
+        if photographs.is_empty() {
+            return Err(FramesError::EmptyFolder { path: path.to_owned() });
+        }
+        Ok(Self(Kind::Photographs(photographs.into_iter())))
+    }
+}
+
+impl Iterator for Frames {
+    type Item = Result<Frame, FramesError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        match &mut self.0 {
+            Kind::Photographs(paths) => paths.next().map(|path| Ok(Frame::photograph(path))),
+            Kind::Recording(recording) => recording.next(),
+        }
+    }
+}
+
+impl Recording {
+    fn next(&mut self) -> Option<Result<Frame, FramesError>> {
+        loop {
+            let next = self.stream.as_mut()?.next();
+            let number = self.count;
+            match next {
+                Some(Ok((time_ns, content))) => {
+                    self.count += 1;
+                    if number.is_multiple_of(self.every) {
+                        return Some(Ok(Frame::new(self.path_of(number), time_ns, content)));
+                    }
+                }
+                Some(Err(problem)) => {
+                    self.stream = None;
+                    let path = self.path.clone();
+                    return Some(Err(match problem.is_early_end() && number > 0 {
+                        true => FramesError::Incomplete { path, frames: number, problem },
+                        false => FramesError::Recording { path, problem },
+                    }));
+                }
+                None => {
+                    self.stream = None;
+                    let problem = Problem::Unsupported("contains no images".to_owned());
+                    let path = self.path.clone();
+                    return (number == 0).then_some(Err(FramesError::Recording { path, problem }));
+                }
+            }
+        }
+    }
+
+    fn path_of(&self, number: u64) -> PathBuf {
+        let stem = if self.path.is_dir() { self.path.file_name() } else { self.path.file_stem() };
+        let stem = stem.unwrap_or("frame".as_ref()).to_string_lossy();
+        self.path.with_file_name(format!("{stem}-{number:06}"))
+    }
+}
+
+fn open(path: &Path, options: &FrameOptions) -> Result<Stream, Problem> {
+    match folder::extension(path).as_str() {
+        #[cfg(any(feature = "mcap", feature = "rosbag1"))]
+        "mcap" | "bag" | "active" | "db3" => {
+            crate::bag::open(path, options.topic.as_deref(), &options.limits)
+        }
+        #[cfg(feature = "rosbag2")]
+        _ if path.is_dir() => {
+            crate::bag::open_folder(path, options.topic.as_deref(), &options.limits)
+        }
+        #[cfg(feature = "video")]
+        "y4m" => y4m(path, &options.limits),
+        #[cfg(feature = "video")]
+        _ => {
+            let video = crate::video::Video::open(path, true, &options.limits)?;
+            Ok(Box::new(video.map(|frame| frame.map(|(time, image)| (time, Content::Gray(image))))))
+        }
+        #[allow(unreachable_patterns, reason = "depends on the features")]
+        _ => Err(Problem::Unsupported("this program was built without its format".to_owned())),
+    }
+}
+
+#[cfg(feature = "video")]
+fn y4m(path: &Path, limits: &Limits) -> Result<Stream, Problem> {
+    let file = std::fs::File::open(path).map_err(Problem::Io)?;
+    let Some(mut video) = crate::y4m::Y4m::open(std::io::BufReader::new(file), limits)? else {
+        return Err(Problem::Damaged("an empty file (0 bytes)".to_owned()));
+    };
+    let mut number = 0..;
+    Ok(Box::new(std::iter::from_fn(move || {
+        let frame = video.next_frame().transpose()?;
+        let time_ns = number.next().and_then(|number| video.time_ns(number));
+        Some(frame.map(|image| (time_ns, Content::Gray(image))))
+    })))
+}

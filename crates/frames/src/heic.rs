@@ -1,0 +1,49 @@
+//! HEIC photographs, decoded by an installed ffmpeg.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use deltille_core::raster::AnyGray;
+use deltille_files::limits::Limits;
+
+use crate::problem::Problem;
+use crate::video::Video;
+
+/// Number of first bytes that contain the size of the image: the metadata before the pixels.
+const HEAD_BYTES: u64 = 1 << 20;
+
+/// How to convert a photograph that is not read.
+const CONVERT: &str = "convert it to PNG or JPEG, for example with `heif-convert` or `magick`";
+
+/// Reads a HEIC photograph in sensor orientation.
+pub(crate) fn read(path: &Path, limits: &Limits) -> Result<AnyGray, Problem> {
+    let refused = |why: &str| Problem::Unsupported(format!("a HEIC photograph, {why}: {CONVERT}"));
+    let mut head = Vec::new();
+    let file = File::open(path).map_err(Problem::Io)?;
+    file.take(HEAD_BYTES).read_to_end(&mut head).map_err(Problem::Io)?;
+    let mut frames = match Video::open(path, false, limits) {
+        Err(Problem::NoFfmpeg) => {
+            return Err(refused("which is read only if ffmpeg 7 or newer is installed"));
+        }
+        frames => frames?,
+    };
+    let image = match frames.next() {
+        Some(Ok((_, image))) => image,
+        Some(Err(Problem::Exceeded(exceeded))) => return Err(exceeded.into()),
+        _ => return Err(refused("which this version of ffmpeg does not read")),
+    };
+    // Versions that do not assemble the tiles of a photograph return one of them.
+    match stated_size(&head) {
+        Some(size) if size == [image.width(), image.height()] => Ok(image),
+        _ => Err(refused("of which this version of ffmpeg reads only a part")),
+    }
+}
+
+/// Returns the largest size that a property `ispe` states: that of the photograph, not of its tiles or thumbnail.
+fn stated_size(head: &[u8]) -> Option<[usize; 2]> {
+    let sizes = head.windows(16).filter(|bytes| bytes.starts_with(b"ispe"));
+    let side = |bytes: &[u8]| bytes.iter().fold(0, |side, byte| side << 8 | usize::from(*byte));
+    let sizes = sizes.map(|bytes| [side(&bytes[8..12]), side(&bytes[12..16])]);
+    sizes.max_by_key(|[width, height]| width * height)
+}
