@@ -28,11 +28,6 @@ impl<'a> Fields<'a> {
         Ok(bytes)
     }
 
-    /// Returns all bytes that are left.
-    pub(crate) fn rest(self) -> &'a [u8] {
-        self.bytes.get(self.at..).unwrap_or_default()
-    }
-
     /// Whether no byte is left.
     pub(crate) fn is_at_end(&self) -> bool {
         self.at >= self.bytes.len()

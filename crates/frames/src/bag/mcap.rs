@@ -90,22 +90,20 @@ struct Records {
     source: Source,
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, Channel>,
-    length: u64,
 }
 
 impl Records {
     fn open(path: &Path, limits: &Limits) -> Result<Self, Problem> {
-        let length = std::fs::metadata(path).map_err(Problem::Io)?.len();
         let mut source = Source::open(path, limits)?;
         if source.array().ok().as_ref() != Some(MAGIC) {
             return Err(Problem::Damaged("not an MCAP file".to_owned()));
         }
-        Ok(Self { source, schemas: BTreeMap::new(), channels: BTreeMap::new(), length })
+        Ok(Self { source, schemas: BTreeMap::new(), channels: BTreeMap::new() })
     }
 
     /// Returns the position of the summary, if the file was finished.
     fn summary(&mut self) -> Result<Option<u64>, Problem> {
-        let footer = self.length.checked_sub(FOOTER_BYTES).ok_or_else(Problem::cut_off)?;
+        let footer = self.source.length().checked_sub(FOOTER_BYTES).ok_or_else(Problem::cut_off)?;
         self.source.seek(footer)?;
         let footer: [u8; FOOTER_BYTES as usize] = self.source.array()?;
         let start = Fields::new(&footer).u64()?;

@@ -11,6 +11,8 @@ use crate::problem::Problem;
 /// The bytes of a file, or of a chunk of it until its end. Nothing larger than the limits is read into memory.
 pub(crate) struct Source {
     file: BufReader<File>,
+    /// Bytes of the file.
+    length: u64,
     /// Bytes of the file that were not read yet.
     left: u64,
     chunk: Cursor<Vec<u8>>,
@@ -22,15 +24,21 @@ pub(crate) struct Source {
 impl Source {
     pub(crate) fn open(path: &Path, limits: &Limits) -> Result<Self, Problem> {
         let file = File::open(path).map_err(Problem::Io)?;
-        let left = file.metadata().map_err(Problem::Io)?.len();
+        let length = file.metadata().map_err(Problem::Io)?.len();
         let file = BufReader::with_capacity(1 << 16, file);
-        Ok(Self { file, left, chunk: Cursor::default(), is_cut: false, limits: *limits })
+        let chunk = Cursor::default();
+        Ok(Self { file, length, left: length, chunk, is_cut: false, limits: *limits })
     }
 
-    /// Moves to a position in the file.
+    /// Returns the number of bytes of the file.
+    #[cfg(feature = "mcap")]
+    pub(crate) fn length(&self) -> u64 {
+        self.length
+    }
+
+    /// Moves to a position in the file; stays if it is behind the end.
     pub(crate) fn seek(&mut self, position: u64) -> Result<(), Problem> {
-        let end = self.file.seek(SeekFrom::End(0))?;
-        self.left = end.checked_sub(position).ok_or_else(Problem::cut_off)?;
+        self.left = self.length.checked_sub(position).ok_or_else(Problem::cut_off)?;
         self.file.seek(SeekFrom::Start(position))?;
         self.chunk = Cursor::default();
         Ok(())
