@@ -38,12 +38,12 @@ pub use deltille_core::{Clock, Name, camera, glam, lattice, raster, setting, tar
 pub use deltille_files::logo;
 #[cfg(feature = "report")]
 pub use deltille_files::report;
-#[cfg(any(feature = "recordings", feature = "videos"))]
-pub use deltille_frames as frames;
 #[cfg(feature = "files")]
 pub use deltille_files::{SheetUseError, camera_file, clock, export, limits, target_file};
 #[cfg(feature = "photographs")]
 pub use deltille_files::{photograph, remap};
+#[cfg(any(feature = "recordings", feature = "videos"))]
+pub use deltille_frames as frames;
 pub use deltille_layout::{artwork, synth};
 #[cfg(feature = "verify")]
 pub use deltille_verify as verify;

@@ -5,7 +5,7 @@
 Frames of a moving board, drawn by `deltille render`, are written by `rosbags`, `mcap`, OpenCV, Pillow and ffmpeg: bags of
 ROS 1 and 2 with every encoding, storage and compression, in both byte orders, and videos without loss. `deltille detect`
 must find exactly the corners that it finds in PNG files, and report the time stamps. Damaged files must be read as far as
-they go. With a number of megabytes, a bag of this size is read as well, and the peak memory is printed.
+they go. With a number of megabytes, only a bag of this size is read, and the peak memory is printed.
 """
 
 import json
@@ -294,6 +294,7 @@ def videos(check, folder):
 
 
 def large(check, folder, megabytes):
+    """The peak memory while a large bag is read."""
     size = check.frames[0].size
     count = megabytes * 1_000_000 // size
     path = folder / "large.mcap"
@@ -308,7 +309,7 @@ def large(check, folder, megabytes):
         writer.finish()
     found = check.detect(path, "--track", "--format", "csv", "--ink", "none")
     peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
-    print(f"{path.stat().st_size / 1e6:.0f} MB, {count} frames: peak memory of all programs {peak:.0f} MB")
+    print(f"{path.stat().st_size / 1e6:.0f} MB, {count} frames: peak memory {peak:.0f} MB")
     path.unlink()
 
 
@@ -316,12 +317,12 @@ def main(program, folder, megabytes="0"):
     folder = pathlib.Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     check = Check(program, folder)
+    if int(megabytes):
+        return large(check, folder, int(megabytes))
     for part in (encodings, storages, topics, damaged, videos):
         before = check.count
         part(check, folder)
         print(f"{part.__name__}: {check.count - before} comparisons", flush=True)
-    if int(megabytes):
-        large(check, folder, int(megabytes))
 
 
 if __name__ == "__main__":

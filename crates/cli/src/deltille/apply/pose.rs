@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 
 use crate::deltille::calibrate::sightings;
 use crate::deltille::calibrate::sightings::{GridArgs, SheetArgs};
-use crate::deltille::files::images::Images;
+use crate::deltille::files::images::{Images, RecordingArgs};
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::{camera_file, target_file};
 use crate::output::{self, Overwrite, log, say};
@@ -18,16 +18,18 @@ use deltille::detect::{Detection, Detector, DetectorConfig};
 use deltille::export::kind::Kind;
 use deltille::export::pose;
 use deltille::export::sheet::Sheet;
+use deltille::frames::Frame;
 use deltille::limits::Limits;
-use deltille::photograph;
 use deltille::targets::Target;
 
 /// Arguments of `deltille pose`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Photographs: files, folders, patterns, or - for a list on standard input
+    /// Photographs, videos, MCAP files and bags: files, folders, patterns, or - for a list on standard input
     #[arg(required = true, value_name = "IMAGES")]
     images: Vec<PathBuf>,
+    #[command(flatten)]
+    recording: RecordingArgs,
     /// Target description: the .json written with the target, or a .dsc; repeatable for several targets
     #[arg(long, required_unless_present = "grid", value_name = "FILE")]
     target: Vec<PathBuf>,
@@ -86,17 +88,19 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         args.overwrite.check(path, &Kind::of_schema(pose::SCHEMA))?;
     }
     let (mut lines, mut all, mut without, mut unread) = (String::new(), 0, 0, 0);
-    for image in Images::of(&args.images)?.iter() {
-        let image = image?;
+    let options = args.recording.options(limits);
+    for frame in Images::of(&args.images)?.frames(&options, true) {
+        let frame = frame?;
         all += 1;
-        let name = image.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let (name, image) = (frame.name(), frame.path().to_owned());
+        let time_ns = frame.time_ns();
         let mut of_image = String::new();
-        match finder.find(&image, &name)? {
+        match finder.find(frame, &name)? {
             Seen::Unread(why) => {
                 log!("error: {why}");
                 (without, unread) = (without + 1, unread + 1);
                 for target in finder.targets.iter().filter(|_| args.all_images) {
-                    of_image += &(pose::write_none(&name, &target.name, &why) + "\n");
+                    of_image += &(pose::write_none(&name, time_ns, &target.name, &why) + "\n");
                 }
             }
             Seen::Targets(found) => {
@@ -106,7 +110,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                     match found {
                         Ok(found) => {
                             let views = found.cameras.iter().flat_map(|camera| &camera.views);
-                            let line = |view| pose::write_line(&found, view, target) + "\n";
+                            let line =
+                                |view| pose::write_line(&found, view, time_ns, target) + "\n";
                             of_image += &views.map(line).collect::<String>();
                         }
                         Err(why) => {
@@ -115,7 +120,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                                 log!("{}: {}{why}", image.display(), finder.of_target(target));
                             }
                             if args.all_images {
-                                let line = pose::write_none(&name, &target.name, &why);
+                                let line = pose::write_none(&name, time_ns, &target.name, &why);
                                 of_image += &(line + "\n");
                             }
                         }
@@ -167,13 +172,14 @@ impl Finder {
         }
     }
 
-    fn find(&self, image: &Path, name: &str) -> anyhow::Result<Seen> {
-        let picture = match photograph::read_within(image, &self.limits) {
-            Ok(picture) => picture,
+    fn find(&self, frame: Frame, name: &str) -> anyhow::Result<Seen> {
+        let image = frame.path().to_owned();
+        let picture = match frame.read(&self.limits, false) {
+            Ok(photograph) => photograph.image,
             Err(error) => return Ok(Seen::Unread(error.to_string())),
         };
         let seen = [(name.to_owned(), self.detector.detect(&picture, name))];
-        let found = self.targets.iter().map(|target| self.pose(target, &seen, image));
+        let found = self.targets.iter().map(|target| self.pose(target, &seen, &image));
         Ok(Seen::Targets(found.collect::<anyhow::Result<_>>()?))
     }
 

@@ -25,9 +25,9 @@ use deltille::detect::{Detection, Detector, DetectorConfig};
 use deltille::export::kind::Kind;
 use deltille::export::sheet::Sheet;
 use deltille::export::{next_view, svg};
+use deltille::frames::Frame;
 use deltille::layout::Printing;
 use deltille::limits::Limits;
-use deltille::photograph;
 use deltille::raster::AnyGray;
 use deltille::targets::Target;
 use deltille_core::words::{counted, shown};
@@ -347,8 +347,8 @@ impl Watch<'_> {
         last: &mut Option<AnyGray>,
     ) -> anyhow::Result<Option<Seen>> {
         let show = name(path);
-        let picture = match photograph::read_within(path, &self.limits) {
-            Ok(picture) => picture,
+        let picture = match Frame::photograph(path.to_owned()).read(&self.limits, false) {
+            Ok(photograph) => photograph.image,
             Err(error) => {
                 let waited = now.duration_since(since).unwrap_or_default();
                 if waited < GIVEN_UP {

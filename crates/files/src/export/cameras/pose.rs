@@ -14,6 +14,8 @@ struct PoseLine<'a> {
     schema: &'static str,
     view: &'a str,
     image: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    time_ns: Option<i64>,
     target: &'a str,
     corners: usize,
     outliers: usize,
@@ -27,6 +29,8 @@ struct PoseLine<'a> {
 struct NoPoseLine<'a> {
     schema: &'static str,
     image: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    time_ns: Option<i64>,
     target: &'a str,
     camera_from_target: Option<Motion>,
     reason: &'a str,
@@ -36,21 +40,29 @@ fn is_one(count: &usize) -> bool {
     *count == 1
 }
 
-/// The line of an image without a pose, with the reason; without a line end.
-pub fn write_none(image: &str, target: &str, reason: &str) -> String {
-    let line = NoPoseLine { schema: SCHEMA, image, target, camera_from_target: None, reason };
+/// The line of an image without a pose, with the reason and the time stamp, ns, if it has one; without a line end.
+pub fn write_none(image: &str, time_ns: Option<i64>, target: &str, reason: &str) -> String {
+    let line =
+        NoPoseLine { schema: SCHEMA, image, time_ns, target, camera_from_target: None, reason };
     serde_json::to_string(&line).expect("plain data has a JSON form")
 }
 
 /// The line of a view of a single camera, with the standard deviations of its pose. For a target without tags, it contains the
-/// number of poses in which the target looks the same. There is no line end.
-pub fn write_line(estimate: &Estimate, view: &ViewEstimate, target: &Target) -> String {
+/// number of poses in which the target looks the same. `time_ns` is the time stamp of the image, if it has one. There is no
+/// line end.
+pub fn write_line(
+    estimate: &Estimate,
+    view: &ViewEstimate,
+    time_ns: Option<i64>,
+    target: &Target,
+) -> String {
     let alike =
         Reference::Target(target).label_symmetries().iter().map(|maps| 1 + maps.len()).max();
     let line = PoseLine {
         schema: SCHEMA,
         view: &view.name,
         image: &view.image,
+        time_ns,
         target: &target.name,
         equivalent_poses: alike.unwrap_or(1),
         corners: view.corners.len(),

@@ -11,6 +11,8 @@ pub(super) enum Kind {
     Signed,
     /// An unsigned integer of 32 bits.
     Unsigned,
+    /// A signed integer of 64 bits.
+    Long,
     /// A double-precision number.
     Real,
     /// True or false.
@@ -89,7 +91,7 @@ pub(super) const CORNERS: [Column; 17] = [
 ];
 
 /// A row for each image.
-pub(super) const IMAGES: [Column; 25] = [
+pub(super) const IMAGES: [Column; 26] = [
     column("image", Kind::Text),
     column("width", Kind::Signed).gaps(),
     column("height", Kind::Signed).gaps(),
@@ -115,4 +117,5 @@ pub(super) const IMAGES: [Column; 25] = [
     column("damage", Kind::Text).gaps().extra(),
     column("error", Kind::Text).gaps().extra(),
     column("targets", Kind::Text).gaps().extra(),
+    column("time_ns", Kind::Long).gaps().extra(),
 ];

@@ -235,6 +235,7 @@ impl Reader {
                     Ok::<u32, TableError>(value as u32)
                 };
                 let mut found = Detection::new(image, [side(1)?, side(2)?], Vec::new());
+                found.time_ns = row.whole(25)?;
                 found.tone = row.tone()?;
                 found.ink = row.ink()?;
                 let exif_orientation = row.unsigned(21)?.map(u8::try_from).transpose();
@@ -489,7 +490,7 @@ fn cells<T: DataType>(
 fn name_of(kind: Kind) -> &'static str {
     match kind {
         Kind::Text => "text",
-        Kind::Signed | Kind::Unsigned => "an integer",
+        Kind::Signed | Kind::Unsigned | Kind::Long => "an integer",
         Kind::Real => "a number",
         Kind::Flag => "true or false",
     }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
-use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DoubleType, Int32Type};
+use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DoubleType, Int32Type, Int64Type};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
@@ -200,6 +200,7 @@ fn picture_row(picture: &ImageRecord) -> [Cell; column::IMAGES.len()] {
         file.and_then(|file| file.damage.as_deref()).map_or(Cell::None, text),
         picture.found.as_ref().err().map_or(Cell::None, |why| text(why)),
         targets.map_or(Cell::None, |all| to_json(serde_json::to_value(all))),
+        whole(found.and_then(|found| found.time_ns)),
     ]
 }
 
@@ -221,6 +222,7 @@ struct Values {
 enum Typed {
     Text(Vec<ByteArray>),
     Whole(Vec<i32>),
+    Long(Vec<i64>),
     Real(Vec<f64>),
     Flag(Vec<bool>),
 }
@@ -282,6 +284,7 @@ fn field(column: &Column) -> Result<Type, ParquetError> {
         Kind::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
         Kind::Signed => (Physical::INT32, None),
         Kind::Unsigned => (Physical::INT32, Some(LogicalType::integer(32, false))),
+        Kind::Long => (Physical::INT64, None),
         Kind::Real => (Physical::DOUBLE, None),
         Kind::Flag => (Physical::BOOLEAN, None),
     };
@@ -295,6 +298,7 @@ impl Typed {
         match kind {
             Kind::Text => Self::Text(Vec::new()),
             Kind::Signed | Kind::Unsigned => Self::Whole(Vec::new()),
+            Kind::Long => Self::Long(Vec::new()),
             Kind::Real => Self::Real(Vec::new()),
             Kind::Flag => Self::Flag(Vec::new()),
         }
@@ -309,6 +313,7 @@ impl Values {
             (Typed::Text(values), Cell::Text(value)) => values.push(value),
             // Unsigned values are stored in the same bits.
             (Typed::Whole(values), Cell::Whole(value)) => values.push(value as i32),
+            (Typed::Long(values), Cell::Whole(value)) => values.push(value),
             (Typed::Real(values), Cell::Real(value)) => values.push(value),
             (Typed::Flag(values), Cell::Flag(value)) => values.push(value),
             (_, cell) => unreachable!("column {}: {cell:?}", self.column.name),
@@ -324,6 +329,9 @@ impl Values {
             }
             Typed::Whole(values) => {
                 out.typed::<Int32Type>().write_batch(&mem::take(values), levels, None)?
+            }
+            Typed::Long(values) => {
+                out.typed::<Int64Type>().write_batch(&mem::take(values), levels, None)?
             }
             Typed::Real(values) => {
                 out.typed::<DoubleType>().write_batch(&mem::take(values), levels, None)?
