@@ -9,7 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, Optional, Union
 
-from ._core import Detection, Detector, Target, _tables
+from ._core import Detection, Detector, Frame, Frames, Target, _tables
 from .errors import Error, FileError, ImageError
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from typing import TypeAlias
 
-    Picture: TypeAlias = Union[str, "os.PathLike[str]", bytes, NDArray[Any]]
+    Picture: TypeAlias = Union[str, "os.PathLike[str]", bytes, NDArray[Any], Frame]
     Result: TypeAlias = Union[Detection, "Failure"]
 
 __all__ = ["Failure", "detect_many", "load_detections"]
@@ -62,8 +62,9 @@ def detect_many(
 
     Parameters
     ----------
-    pictures : iterable of path-like, bytes or ndarray
-        Paths of photographs, contents of their files, or arrays as for :meth:`Detector.detect`.
+    pictures : iterable of path-like, bytes, ndarray or Frame
+        Paths of photographs, contents of their files, or arrays as for :meth:`Detector.detect`; or :func:`frames` of a video
+        or recording.
     target : Target, sequence of Target, or Detector
         The target to find.
     workers : int, optional
@@ -72,7 +73,7 @@ def detect_many(
         A wrapper such as ``tqdm.tqdm``, called with an iterable, and with ``total`` if the number of images is known.
     ink_of_all : bool, optional
         Repeat detection in all images with their combined ink estimate, as ``deltille detect`` does. Arrays are kept in
-        memory for that.
+        memory for that; :func:`frames` are read again.
     accept_damaged : bool, optional
         Accept truncated JPEG files.
 
@@ -93,7 +94,7 @@ def detect_many(
 
     def taken() -> Iterator[Picture]:
         for picture in pictures:
-            if ink_of_all:
+            if ink_of_all and not isinstance(pictures, Frames):
                 seen.append(picture)
             yield picture
 
@@ -103,7 +104,10 @@ def detect_many(
     good = [index for index, result in enumerate(found) if isinstance(result, Detection)]
     again = detector.with_ink_of([result for result in found if isinstance(result, Detection)])
     if again is not None:
-        second = _all(again, (seen[index] for index in good), count, progress, len(good), accept_damaged)
+        wanted = set(good)
+        every = enumerate(pictures if isinstance(pictures, Frames) else seen)
+        repeated = (picture for index, picture in every if index in wanted)
+        second = _all(again, repeated, count, progress, len(good), accept_damaged)
         for index, result in zip(good, second):
             if isinstance(result, Detection):
                 found[index] = result
@@ -184,7 +188,10 @@ def _in_order(
 
 
 def _one(detector: Detector, index: int, picture: Picture, accept_damaged: bool) -> Result:
-    name = Path(picture).name if isinstance(picture, (str, os.PathLike)) else f"{index:04}"
+    if isinstance(picture, Frame):
+        name = picture.name
+    else:
+        name = Path(picture).name if isinstance(picture, (str, os.PathLike)) else f"{index:04}"
     try:
         if isinstance(picture, (str, os.PathLike)):
             return detector.detect_file(picture, accept_damaged=accept_damaged)

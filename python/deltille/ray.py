@@ -88,6 +88,7 @@ IMAGES = pa.schema(
         ("damage", pa.string()),
         ("error", pa.string()),
         ("targets", pa.string()),
+        ("time_ns", pa.int64()),
     ],
     metadata={"deltille.schema": "deltille/images/1"},
 )
@@ -443,6 +444,7 @@ class _Rows:
             "tags": len(found.tags),
             "exif_orientation": found.exif_orientation,
             "damage": found.damage,
+            "time_ns": found.time_ns,
         }
         if found.target_identities:
             picture["targets"] = json.dumps(found.target_identities)

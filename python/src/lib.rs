@@ -73,6 +73,8 @@ mod _core {
     #[pymodule_export]
     use super::see::detector::{_detector, Detector};
     #[pymodule_export]
+    use super::see::frames::{Frame, FrameIterator, Frames, frames_of};
+    #[pymodule_export]
     use super::see::pose::Pose;
     #[pymodule_export]
     use super::see::rendering::{Truth, render};

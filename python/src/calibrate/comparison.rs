@@ -403,9 +403,15 @@ impl Located {
     /// Returns the line that ``deltille pose`` writes.
     fn to_json(&self) -> String {
         let found = self.estimate.as_ref().zip(self.view());
+        let time_ns = self.asked.detection.found.time_ns;
         match found {
-            Some((estimate, view)) => pose::write_line(estimate, view, self.asked.target.target()),
-            None => pose::write_none(&self.image, &self.target, self.why.as_deref().unwrap_or("")),
+            Some((estimate, view)) => {
+                pose::write_line(estimate, view, time_ns, self.asked.target.target())
+            }
+            None => {
+                let why = self.why.as_deref().unwrap_or_default();
+                pose::write_none(&self.image, time_ns, &self.target, why)
+            }
         }
     }
 

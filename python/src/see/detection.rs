@@ -16,6 +16,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::frames::seconds;
 use crate::boundary::arrays::{self, record};
 use crate::boundary::errors::{self, Raise, RaiseFile, raised};
 use crate::boundary::text_file::save_text;
@@ -438,6 +439,18 @@ impl Detection {
     #[getter]
     fn target_identities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         record(py, &self.found.targets)
+    }
+
+    /// Time stamp of a frame, s; ``None`` for photographs. :attr:`time_ns` is exact.
+    #[getter]
+    fn time(&self) -> Option<f64> {
+        self.found.time_ns.map(seconds)
+    }
+
+    /// Time stamp of a frame, ns, as an exact integer; ``None`` for photographs.
+    #[getter]
+    fn time_ns(&self) -> Option<i64> {
+        self.found.time_ns
     }
 
     /// EXIF orientation, 2 to 8; ``None`` if the image is upright.

@@ -7,14 +7,15 @@ use deltille::detect::{self, DetectorConfig, Ink, Refinement, Tone};
 use deltille::lattice::GridKind;
 use deltille::limits::Limits;
 use deltille::photograph;
+use deltille::raster::ImageView;
 use deltille::targets::SIDES;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::detection::{Detection, Targets};
+use super::frames::detected;
 use crate::boundary::arrays::whole;
 use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
-use crate::boundary::image::Picture;
 use crate::targets::target::Target;
 
 /// Detects targets, or untagged boards, in images. Several threads can use one detector at the same time.
@@ -223,12 +224,12 @@ impl Detector {
     ///
     /// Parameters
     /// ----------
-    /// image : ndarray
-    ///     H × W of uint8, uint16 or float32 (0, black, to 1, white), or H × W × 3 of uint8 in the order red, green, blue
+    /// image : ndarray or Frame
+    ///     A frame of :func:`frames`, or H × W of uint8, uint16 or float32 (0, black, to 1, white), or H × W × 3 of uint8 in the order red, green, blue
     ///     (for OpenCV's blue, green, red, pass ``image[..., ::-1]``). Any strides are allowed; contiguous rows are not
     ///     copied.
     /// name : str, optional
-    ///     Name of the image, stored in the result.
+    ///     Name of the image, stored in the result; defaults to that of the frame.
     ///
     /// Returns
     /// -------
@@ -238,12 +239,11 @@ impl Detector {
     /// Raises
     /// ------
     /// ImageError
-    ///     If the array is not an image.
+    ///     If the array is not an image, or the frame cannot be read.
     #[pyo3(signature = (image, *, name = ""))]
     fn detect(&self, py: Python<'_>, image: &Bound<'_, PyAny>, name: &str) -> PyResult<Detection> {
-        let picture = Picture::of(image, &self.limits)?;
-        let view = picture.viewed()?;
-        let found = unlocked(py, || self.detector.detect(view, name))?;
+        let detect = |view: ImageView<'_>, name: &str| self.detector.detect(view, name);
+        let found = detected(py, image, name, &self.limits, detect)?;
         Ok(Detection { found: Arc::new(found), targets: self.targets.clone() })
     }
 

@@ -7,10 +7,10 @@ use pyo3::prelude::*;
 
 use super::detection::Detection;
 use super::detector::Detector;
-use crate::boundary::errors::unlocked;
-use crate::boundary::image::Picture;
+use super::frames::detected;
 use crate::targets::target::Target;
 use deltille::limits::Limits;
+use deltille::raster::ImageView;
 
 /// Detects targets in successive images of a video, in less than half of the time that :class:`Detector`
 /// takes for single images.
@@ -50,7 +50,7 @@ impl Tracker {
     ///
     /// Parameters
     /// ----------
-    /// image : ndarray
+    /// image : ndarray or Frame
     ///     An image as for :meth:`Detector.detect`.
     /// name : str, optional
     ///     Name of the image, stored in the result.
@@ -62,14 +62,13 @@ impl Tracker {
     /// Raises
     /// ------
     /// ImageError
-    ///     If the array is not an image.
+    ///     If the array is not an image, or the frame cannot be read.
     #[pyo3(signature = (image, *, name = ""))]
     fn detect(&self, py: Python<'_>, image: &Bound<'_, PyAny>, name: &str) -> PyResult<Detection> {
-        let picture = Picture::of(image, &self.limits)?;
-        let view = picture.viewed()?;
-        let found = unlocked(py, || {
+        let detect = |view: ImageView<'_>, name: &str| {
             self.tracker.lock().unwrap_or_else(PoisonError::into_inner).detect(view, name)
-        })?;
+        };
+        let found = detected(py, image, name, &self.limits, detect)?;
         Ok(Detection { found: Arc::new(found), targets: self.targets.clone() })
     }
 
