@@ -1,22 +1,26 @@
 """Recordings that other programs write, compared with the same frames as PNG.
 
     recordings.py <deltille> <folder> [megabytes]
+    recordings.py <deltille> tests/recordings samples
 
 Frames of a moving board, drawn by `deltille render`, are written by `rosbags`, `mcap`, OpenCV, Pillow and ffmpeg: bags of
 ROS 1 and 2 with every encoding, storage and compression, in both byte orders, and videos without loss. `deltille detect`
 must find exactly the corners that it finds in PNG files, and report the time stamps. Damaged files must be read as far as
-they go. With a number of megabytes, only a bag of this size is read, and the peak memory is printed.
+they go. With a number of megabytes, only a bag of this size is read, and the peak memory is printed. The second form
+writes small recordings for the tests in Rust.
 """
 
 import json
 import pathlib
 import resource
-import struct
+import sqlite3
 import subprocess
 import sys
+import tempfile
 
 import cv2
 import numpy as np
+from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
@@ -122,17 +126,18 @@ def mcap(path, messages, compression, is_ros1=False, chunk=1 << 16):
     return path
 
 
-def rendered(program, folder):
+def rendered(program, folder, size=SIZE, count=FRAMES, noise=1):
     """The board, and frames in which it moves."""
-    run(program, "board", "--rows", 6, "--cols", 8, "--edge", "25mm", "--no-verify", "-o", folder, "--force")
+    run(program, "board", "--rows", 5, "--cols", 6, "--edge", "30mm", "--no-verify", "-o", folder, "--force")
     camera = folder / "camera.yaml"
-    camera.write_text("width: 640\nheight: 480\nmodel: pinhole\nfocal_px: [600, 600]\ncentre_px: [319.5, 239.5]\n")
+    (width, height), focal = size, 0.94 * size[0]
+    camera.write_text(f"width: {width}\nheight: {height}\nmodel: pinhole\nfocal_px: [{focal}, {focal}]\ncentre_px: [{width / 2}, {height / 2}]\n")
     frames = []
     (folder / "png").mkdir(exist_ok=True)
-    for index in range(FRAMES):
+    for index in range(count):
         path = folder / "png" / f"{index:06}.png"
-        pose = f"0.3,{3.0 - 0.02 * index},0.1,{-90 + 3 * index},{70 - 2 * index},420"
-        run(program, "render", folder / "board.json", "--camera", camera, f"--pose={pose}", "--seed", index, "-o", path, "--force")
+        eye = f"{60 + 15 * index},{-40 + 5 * index},{330 + 5 * index}"
+        run(program, "render", folder / "board.json", "--camera", camera, f"--eye={eye}", "--seed", index, "--noise", noise, "-o", path, "--force")
         frames.append(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE))
         path.with_suffix(".json").unlink()
     return folder / "board.json", frames
@@ -226,7 +231,7 @@ def topics(check, folder):
         check.equal(bag, "--topic", "/camera/image")
         check.equal(bag, "--topic", "/right", count=3)
         check.refused(bag, "/camera/image, /right")
-        check.refused(bag, "/left is not a topic with images", "--topic", "/left")
+        check.refused(bag, "`/left` is not a topic with images", "--topic", "/left")
 
 
 def damaged(check, folder):
@@ -293,6 +298,32 @@ def videos(check, folder):
     check.equal(folder / "run.mp4", "--track", "--ink", "none", stamps=time, expected=check.detect(folder / "png", "--track", "--ink", "none"))
 
 
+def samples(program, folder):
+    """Small recordings of two frames: MCAP with two topics, bags of ROS 1 and 2, and a video."""
+    with tempfile.TemporaryDirectory() as scratch:
+        _, frames = rendered(program, pathlib.Path(scratch), (160, 120), 2, 0)
+        bag = bag2(pathlib.Path(scratch) / "bag", [compressed(ROS2, i, f, "png") for i, f in enumerate(frames)], StoragePlugin.SQLITE3)
+        (folder / "run.db3").unlink(missing_ok=True)
+        with sqlite3.connect(next(bag.glob("*.db3"))) as database:
+            database.executescript(f"PRAGMA page_size = 512; VACUUM INTO '{folder / 'run.db3'}';")
+        bag = bag2(pathlib.Path(scratch) / "bag", [raw(ROS2, i, f, "mono8") for i, f in enumerate(frames)], StoragePlugin.MCAP, more=[("/right", COMPRESSED, [compressed(ROS2, 0, frames[0], "png")])])
+        with open(next(bag.glob("*.mcap")), "rb") as file, open(folder / "run.mcap", "wb") as out:
+            reader, writer = make_reader(file), Writer(out, compression=CompressionType.ZSTD)
+            writer.start(profile="ros2")
+            schemas, channels = {}, {}
+            for schema, channel, message in reader.iter_messages():
+                if channel.id not in channels:
+                    schemas[schema.id] = writer.register_schema(schema.name, schema.encoding, b"")
+                    channels[channel.id] = writer.register_channel(channel.topic, "cdr", schemas[schema.id])
+                writer.add_message(channels[channel.id], message.log_time, message.data, message.publish_time)
+            writer.finish()
+    bag1(folder / "run.bag", [raw(ROS1, i, f, "mono8") for i, f in enumerate(frames)], Writer1.CompressionFormat.BZ2)
+    size = f"{frames[0].shape[1]}x{frames[0].shape[0]}"
+    grey = b"".join(frame.tobytes() for frame in frames)
+    command = ["ffmpeg", "-y", "-v", "error", "-f", "rawvideo", "-pix_fmt", "gray", "-s", size, "-r", "25", "-i", "pipe:0"]
+    subprocess.run([*command, "-frames:v", "1", "-f", "yuv4mpegpipe", str(folder / "run.y4m")], input=grey, check=True)
+
+
 def large(check, folder, megabytes):
     """The peak memory while a large bag is read."""
     size = check.frames[0].size
@@ -316,6 +347,8 @@ def large(check, folder, megabytes):
 def main(program, folder, megabytes="0"):
     folder = pathlib.Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
+    if megabytes == "samples":
+        return samples(program, folder)
     check = Check(program, folder)
     if int(megabytes):
         return large(check, folder, int(megabytes))

@@ -10,12 +10,13 @@ type Module = Vec<String>;
 
 /// Sources without circular imports between modules, including imports through the re-exports of a
 /// `mod.rs` or `lib.rs`.
-const SOURCES: [&str; 12] = [
+const SOURCES: [&str; 13] = [
     "crates/calibrate/src",
     "crates/cli/src",
     "crates/core/src",
     "crates/detect/src",
     "crates/files/src",
+    "crates/frames/src",
     "crates/lab/src",
     "crates/layout/src",
     "crates/search/src",

@@ -11,14 +11,13 @@ use crate::pixels::RawImage;
 use crate::problem::FramesError;
 
 /// The content of a frame.
+#[allow(dead_code, reason = "depends on the features")]
 pub(crate) enum Content {
     /// A photograph in its file.
     File(PathBuf),
     /// A decoded image.
-    #[cfg(feature = "video")]
     Gray(AnyGray),
     /// The bytes of a photograph's file.
-    #[cfg(any(feature = "mcap", feature = "rosbag1"))]
     Encoded(Vec<u8>),
     /// The pixels of a camera.
     #[cfg(any(feature = "mcap", feature = "rosbag1"))]
@@ -30,9 +29,7 @@ impl Content {
     pub(crate) fn pixels(&self, limits: &Limits) -> Option<u64> {
         match self {
             Self::File(path) => photograph::pixels(path, limits),
-            #[cfg(feature = "video")]
             Self::Gray(image) => Some(image.width() as u64 * image.height() as u64),
-            #[cfg(any(feature = "mcap", feature = "rosbag1"))]
             Self::Encoded(bytes) => photograph::pixels_of(bytes),
             #[cfg(any(feature = "mcap", feature = "rosbag1"))]
             Self::Raw(image) => Some(image.pixels()),
@@ -54,9 +51,7 @@ impl Content {
                 image.map(without_notes).map_err(|problem| FramesError::Recording { path, problem })
             }
             Self::File(path) => Ok(photograph::read_with_notes(&path, limits, accept_damaged)?),
-            #[cfg(feature = "video")]
             Self::Gray(image) => Ok(without_notes(image)),
-            #[cfg(any(feature = "mcap", feature = "rosbag1"))]
             Self::Encoded(bytes) => {
                 Ok(photograph::read_bytes(path, bytes, limits, accept_damaged)?)
             }

@@ -104,7 +104,7 @@ impl Recording {
                     self.stream = None;
                     let path = self.path.clone();
                     return Some(Err(match problem.is_early_end() && number > 0 {
-                        true => FramesError::Incomplete { path, frames: number, problem },
+                        true => FramesError::Incomplete { path, frames: number as usize, problem },
                         false => FramesError::Recording { path, problem },
                     }));
                 }

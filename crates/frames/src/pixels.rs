@@ -4,6 +4,7 @@
 //! blue are brought to the level of green. Source: `sensor_msgs/image_encodings.hpp` of ROS.
 
 use deltille_core::raster::{AnyGray, Colours, Gray, Intensity};
+use deltille_core::words::quoted;
 use deltille_files::limits::Limits;
 
 use crate::problem::Problem;
@@ -78,8 +79,9 @@ impl RawImage {
         limits: &Limits,
     ) -> Result<Self, Problem> {
         limits.check_pixels(width, height)?;
-        let unknown =
-            || Problem::Unsupported(format!("encoding {encoding} (supported: {SUPPORTED})"));
+        let unknown = || {
+            Problem::Unsupported(format!("encoding {} (supported: {SUPPORTED})", quoted(encoding)))
+        };
         let encoding = Encoding::of(encoding).ok_or_else(unknown)?;
         let [width, height, step] = [width, height, step].map(|number| number as usize);
         let row = width * encoding.bytes_per_pixel();

@@ -4,6 +4,7 @@ use std::io;
 use std::path::PathBuf;
 
 use deltille_core::setting::Setting::FrameOptionsTopic;
+use deltille_core::words::{counted, cut, quoted};
 use deltille_files::limits::Exceeded;
 use deltille_files::photograph::ImageError;
 
@@ -30,12 +31,12 @@ pub enum FramesError {
         problem: Problem,
     },
     /// A recording ends early, because it is damaged or was not finished. The frames before are valid.
-    #[error("{}: incomplete after {frames} frames: {problem}", path.display())]
+    #[error("{}: incomplete after {}: {problem}", path.display(), counted(*frames, "frame"))]
     Incomplete {
         /// The recording.
         path: PathBuf,
         /// Number of frames before the end.
-        frames: u64,
+        frames: usize,
         /// The problem.
         #[source]
         problem: Problem,
@@ -48,7 +49,7 @@ pub enum FramesError {
 pub enum Problem {
     /// The operating system reports an error.
     #[error("{0}")]
-    Io(io::Error),
+    Io(#[source] io::Error),
     /// The content is damaged, or was not written completely.
     #[error("{0}")]
     Damaged(String),
@@ -64,10 +65,10 @@ pub enum Problem {
     )]
     NoFfmpeg,
     /// The recording has several topics with images.
-    #[error("{} topics contain images: choose one with {FrameOptionsTopic} ({})", .0.len(), .0.join(", "))]
+    #[error("{} topics contain images: choose one with {FrameOptionsTopic} ({})", .0.len(), in_words(.0))]
     Topics(Vec<String>),
     /// The requested topic does not exist or contains no images.
-    #[error("{topic} is not a topic with images ({})", in_words(topics))]
+    #[error("{} is not a topic with images ({})", quoted(topic), in_words(topics))]
     NoTopic {
         /// The requested topic.
         topic: String,
@@ -114,5 +115,8 @@ impl From<Exceeded> for Problem {
 }
 
 fn in_words(topics: &[String]) -> String {
-    if topics.is_empty() { "there is none".to_owned() } else { topics.join(", ") }
+    if topics.is_empty() {
+        return "there is none".to_owned();
+    }
+    topics.iter().map(|topic| cut(topic)).collect::<Vec<_>>().join(", ")
 }

@@ -10,6 +10,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 
 use deltille_core::raster::AnyGray;
+use deltille_core::words::cut;
 use deltille_files::limits::Limits;
 
 use crate::problem::Problem;
@@ -81,7 +82,7 @@ impl Video {
             Ok(status) => Some(status.to_string()),
             Err(error) => Some(error.to_string()),
         });
-        error.map(|error| Problem::Damaged(format!("ffmpeg reports: {error}")))
+        error.map(|error| Problem::Damaged(format!("ffmpeg reports: {}", cut(&error))))
     }
 }
 

@@ -13,6 +13,7 @@
 use std::io::{self, BufRead, Read};
 
 use deltille_core::raster::{AnyGray, Gray};
+use deltille_core::words::quoted;
 use deltille_files::limits::Limits;
 
 use crate::problem::Problem;
@@ -62,7 +63,7 @@ impl<R: BufRead> Y4m<R> {
         };
         limits.check_pixels(width, height)?;
         let (bits, colour_bytes) = planes(format, [width, height].map(u64::from))
-            .ok_or_else(|| Problem::Unsupported(format!("Y4M format {format}")))?;
+            .ok_or_else(|| Problem::Unsupported(format!("Y4M format {}", quoted(format))))?;
         let size = [width, height].map(|side| side as usize);
         Ok(Some(Self { source, size, bits, colour_bytes, rate }))
     }

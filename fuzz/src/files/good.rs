@@ -196,6 +196,22 @@ fn part_as(format: ImageFormat) -> Vec<u8> {
     bytes.into_inner()
 }
 
+pub fn y4m() -> Vec<u8> {
+    include_bytes!("../../../tests/recordings/run.y4m").to_vec()
+}
+
+pub fn mcap() -> Vec<u8> {
+    include_bytes!("../../../tests/recordings/run.mcap").to_vec()
+}
+
+pub fn rosbag1() -> Vec<u8> {
+    include_bytes!("../../../tests/recordings/run.bag").to_vec()
+}
+
+pub fn rosbag2() -> Vec<u8> {
+    include_bytes!("../../../tests/recordings/run.db3").to_vec()
+}
+
 pub fn photograph_png() -> Vec<u8> {
     part_as(ImageFormat::Png)
 }

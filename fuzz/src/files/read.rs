@@ -6,6 +6,7 @@ use deltille::camera::Camera;
 use deltille::export::dsc::{self, Dialect};
 use deltille::export::{csv, detection as detections, orpc, sheet, solid_mesh};
 use deltille::family::Family;
+use deltille::frames::{FrameOptions, Frames};
 use deltille::lattice::GridKind;
 use deltille::layout::Printing;
 use deltille::limits::Limits;
@@ -130,6 +131,29 @@ pub fn photograph(file: File) -> bool {
     };
     let [undamaged, _] = [false, true].map(read);
     undamaged.is_some()
+}
+
+pub fn recording(file: File) -> bool {
+    let mut options = FrameOptions::default();
+    options.limits = limits();
+    // The sample has a second topic.
+    options.topic =
+        file.path.extension().filter(|end| *end == "mcap").map(|_| "/camera/image".to_owned());
+    let Ok(frames) = Frames::open(file.path, &options) else { return false };
+    // An error is the last item.
+    let mut is_whole = true;
+    for frame in frames {
+        let Ok(frame) = frame else {
+            is_whole = false;
+            continue;
+        };
+        assert!(is_whole, "a frame after an error");
+        let stated = frame.pixels(&limits());
+        let Ok(photograph) = frame.read(&limits(), true) else { continue };
+        let pixels = photograph.image.width() as u64 * photograph.image.height() as u64;
+        assert!(pixels <= limits().max_pixels && stated == Some(pixels));
+    }
+    is_whole
 }
 
 pub fn page(file: File) -> bool {

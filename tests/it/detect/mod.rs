@@ -9,6 +9,7 @@ mod outer_corners;
 mod panel_ids;
 mod photographs;
 mod reasons;
+mod recordings;
 mod refine;
 mod solid_views;
 mod synthetic;

@@ -70,6 +70,7 @@ fn detections(target: &Target) -> Vec<Detection> {
         found.tone = serde_json::from_value(tone).unwrap();
         found.reasons = serde_json::from_value(reasons).unwrap();
         found.file = serde_json::from_value(json!({ "exif_orientation": 6 })).unwrap();
+        found.time_ns = Some(1_700_000_000_000_000_123 + index as i64);
         found
     };
     (0..12).map(view).collect()

@@ -29,6 +29,7 @@ impl<'a> Fields<'a> {
     }
 
     /// Whether no byte is left.
+    #[cfg(feature = "rosbag1")]
     pub(crate) fn is_at_end(&self) -> bool {
         self.at >= self.bytes.len()
     }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use deltille_core::words::quoted;
 use deltille_files::limits::read_short_text;
 use serde::Deserialize;
 
@@ -50,7 +51,7 @@ pub(super) fn parts(folder: &Path) -> Result<Parts, Problem> {
     let information = metadata.rosbag2_bagfile_information;
     let is_compressed = information.compression_mode.eq_ignore_ascii_case("message");
     if is_compressed && information.compression_format != "zstd" {
-        let format = information.compression_format;
+        let format = quoted(&information.compression_format);
         return Err(Problem::Unsupported(format!("compression {format}")));
     }
     // Early versions write paths relative to the parent folder.

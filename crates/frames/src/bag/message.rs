@@ -137,13 +137,15 @@ mod tests {
             bytes.extend(number(text.len() as u32 + 1));
             bytes.extend(text.as_bytes());
             bytes.push(0);
-            bytes.resize(bytes.len().next_multiple_of(4), 0);
         };
+        let pad = |bytes: &mut Vec<u8>| bytes.resize(bytes.len().next_multiple_of(4), 0);
         bytes.extend([number(7), number(5)].concat());
         text(&mut bytes, "camera");
+        pad(&mut bytes);
         bytes.extend([number(2), number(1)].concat());
         text(&mut bytes, "mono8");
-        bytes.extend([0, 0, 0, 0]);
+        bytes.push(0);
+        pad(&mut bytes);
         bytes.extend([number(1), number(2)].concat());
         bytes.extend([3, 4]);
         bytes

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 
+use deltille_core::words::quoted;
 use deltille_files::limits::{Kind, Limits};
 
 use crate::problem::Problem;
@@ -171,7 +172,7 @@ fn decompressed_part(
         },
         #[cfg(feature = "rosbag1")]
         "bz2" => Box::new(bzip2::read::MultiBzDecoder::new(bytes)),
-        _ => return Err(Problem::Unsupported(format!("compression {compression}"))),
+        _ => return Err(Problem::Unsupported(format!("compression {}", quoted(compression)))),
     };
     let mut content = Vec::new();
     let read = reader.take(most.saturating_add(1)).read_to_end(&mut content);

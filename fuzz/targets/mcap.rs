@@ -1,0 +1,3 @@
+#![no_main]
+
+deltille_fuzz::target!("mcap");
