@@ -308,7 +308,7 @@ def samples(program, folder):
             database.executescript(f"PRAGMA page_size = 512; VACUUM INTO '{folder / 'run.db3'}';")
         bag = bag2(pathlib.Path(scratch) / "bag", [raw(ROS2, i, f, "mono8") for i, f in enumerate(frames)], StoragePlugin.MCAP, more=[("/right", COMPRESSED, [compressed(ROS2, 0, frames[0], "png")])])
         with open(next(bag.glob("*.mcap")), "rb") as file, open(folder / "run.mcap", "wb") as out:
-            reader, writer = make_reader(file), Writer(out, compression=CompressionType.ZSTD)
+            reader, writer = make_reader(file), Writer(out, compression=CompressionType.ZSTD, chunk_size=1 << 14)
             writer.start(profile="ros2")
             schemas, channels = {}, {}
             for schema, channel, message in reader.iter_messages():

@@ -36,7 +36,8 @@ pub(crate) fn topics(path: &Path, limits: &Limits) -> Result<Vec<Topic>, Problem
         match records.next_message() {
             Ok(Some(_)) => {}
             // The reader of the messages reports damage.
-            Ok(None) | Err(Problem::Damaged(_)) => return Ok(records.topics()),
+            Ok(None) => return Ok(records.topics()),
+            Err(Problem::Damaged(_)) if !records.channels.is_empty() => return Ok(records.topics()),
             Err(problem) => return Err(problem),
         }
     }

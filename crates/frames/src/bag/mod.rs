@@ -53,7 +53,11 @@ pub(crate) fn open_folder(
     let folder::Parts { files, is_compressed } = folder::parts(path)?;
     let mut all = Vec::new();
     for file in &files {
-        all.extend(topics(file, limits)?);
+        match topics(file, limits) {
+            // The last file may not be finished.
+            Err(Problem::Damaged(_)) if !all.is_empty() => {}
+            topics => all.extend(topics?),
+        }
     }
     let (topic, limits) = (choose(all, wanted)?, *limits);
     let of_topic = topic.clone();

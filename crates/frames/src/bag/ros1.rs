@@ -36,7 +36,8 @@ pub(crate) fn topics(path: &Path, limits: &Limits) -> Result<Vec<Topic>, Problem
         match records.next_message() {
             Ok(Some(_)) => {}
             // The reader of the messages reports damage.
-            Ok(None) | Err(Problem::Damaged(_)) => {
+            Ok(None) => return Ok(records.connections.into_values().collect()),
+            Err(Problem::Damaged(_)) if !records.connections.is_empty() => {
                 return Ok(records.connections.into_values().collect());
             }
             Err(problem) => return Err(problem),
