@@ -129,7 +129,7 @@ impl Kind {
 pub struct Subject {
     /// Its name in tables and file names.
     pub name: String,
-    page: PrintedPage,
+    pub(crate) page: PrintedPage,
     detector: Detector,
 }
 

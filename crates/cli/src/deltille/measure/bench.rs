@@ -1,4 +1,4 @@
-//! `deltille bench`: run time of each stage on this machine.
+//! `deltille bench`: run times on this machine.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -14,6 +14,7 @@ use crate::run::Interrupted;
 use crate::values::whole;
 use deltille::{clock, photograph};
 use deltille_core::statistics::quantile;
+use deltille_lab::speed::{self, Row};
 
 /// Arguments of `deltille bench`.
 #[derive(clap::Args)]
@@ -24,8 +25,20 @@ pub struct Args {
 
 #[derive(Subcommand)]
 enum Bench {
+    /// Time detection, video, files and calibrations on one thread, with simulated photographs
+    All(AllArgs),
     /// Time the stages of detection on one thread, without decoding files
     Detect(DetectArgs),
+}
+
+#[derive(clap::Args)]
+struct AllArgs {
+    /// Also calibrate from 5,000 views, and a board of 5,000 corners: minutes, and 2 GB of memory
+    #[arg(long)]
+    large: bool,
+    /// Seed of the random number generator
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
 }
 
 #[derive(clap::Args)]
@@ -44,7 +57,29 @@ struct DetectArgs {
 
 /// Runs a benchmark.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let Bench::Detect(args) = args.bench;
+    match args.bench {
+        Bench::All(args) => all(&args),
+        Bench::Detect(args) => detect(&args),
+    }
+}
+
+/// Prints a table of run times, as it is measured.
+fn all(args: &AllArgs) -> anyhow::Result<ExitCode> {
+    let large = speed::LARGE.into_iter().filter(|_| args.large);
+    say!("{:<46}{:>7}{:>12}{:>12}  result", "one thread", "number", "median ms", "longest ms");
+    for group in speed::GROUPS.into_iter().chain(large) {
+        if interrupt::is_raised() {
+            return Err(Interrupted("the table is incomplete".to_owned()).into());
+        }
+        for Row { what, count, median_ms, worst_ms, result } in group(args.seed)? {
+            say!("{what:<46}{count:>7}{median_ms:>12.1}{worst_ms:>12.1}  {result}");
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Prints the run time of each stage of detection.
+fn detect(args: &DetectArgs) -> anyhow::Result<ExitCode> {
     let detector = args.finder.detector()?.1.with_clock(clock::now);
     // Milliseconds of each stage, one number per image.
     let mut stages = BTreeMap::<String, Vec<f64>>::new();
