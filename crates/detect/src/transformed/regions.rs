@@ -60,47 +60,49 @@ const OVER_NOISE: f32 = 2.0;
 /// Blocks of an image.
 #[derive(Clone, Debug)]
 pub(crate) struct Region {
-    columns: usize,
-    rows: usize,
+    /// Number of columns and rows of blocks in the image.
+    all: [usize; 2],
+    /// Columns and rows of blocks of the bounding box.
+    bounds: [Range<usize>; 2],
+    /// Which blocks of the bounding box belong to the region, by rows.
     is_part: Vec<bool>,
 }
 
 impl Region {
     /// Returns the whole of an image.
     pub(crate) fn whole<T: Intensity>(image: &Gray<T>) -> Self {
-        let [columns, rows] = [image.width(), image.height()].map(|side| (side / BLOCK).max(1));
-        Self { columns, rows, is_part: vec![true; columns * rows] }
+        let all = [image.width(), image.height()].map(|side| (side / BLOCK).max(1));
+        Self { all, bounds: all.map(|side| 0..side), is_part: vec![true; all[0] * all[1]] }
     }
 
-    /// Returns the blocks that satisfy `is`, and those around them.
-    fn around(columns: usize, rows: usize, is: impl Fn(usize) -> bool) -> Self {
-        let mut is_part = vec![false; columns * rows];
-        for i in (0..columns * rows).filter(|&i| is(i)) {
-            let [u, v] = [i % columns, i / columns];
-            for row in near(v, AROUND, rows) {
-                is_part[row * columns..][near(u, AROUND, columns)].fill(true);
+    /// Returns the region of some blocks, at least one.
+    fn of(all: [usize; 2], blocks: &[[usize; 2]]) -> Self {
+        let bounds = [0, 1].map(|axis| {
+            let places = || blocks.iter().map(|block| block[axis]);
+            places().min().unwrap_or(0)..places().max().unwrap_or(0) + 1
+        });
+        let mut region =
+            Self { all, is_part: vec![false; bounds[0].len() * bounds[1].len()], bounds };
+        for &block in blocks {
+            if let Some(index) = region.index(block) {
+                region.is_part[index] = true;
             }
         }
-        Self { columns, rows, is_part }
+        region
     }
 
-    /// Divides it into connected regions.
-    fn connected(mut self) -> Vec<Self> {
-        let mut regions = Vec::new();
-        while let Some(first) = self.is_part.iter().position(|&is_part| is_part) {
-            let mut is_part = vec![false; self.is_part.len()];
-            let mut reached = vec![first];
-            while let Some(i) = reached.pop() {
-                if std::mem::take(&mut self.is_part[i]) {
-                    is_part[i] = true;
-                    let [u, v] = [i % self.columns, i / self.columns];
-                    reached.extend(near(v, 1, self.rows).map(|v| v * self.columns + u));
-                    reached.extend(near(u, 1, self.columns).map(|u| v * self.columns + u));
-                }
-            }
-            regions.push(Self { is_part, ..self });
-        }
-        regions
+    /// Returns the index of a block in the bounding box.
+    fn index(&self, [u, v]: [usize; 2]) -> Option<usize> {
+        let [columns, rows] = &self.bounds;
+        let is_inside = columns.contains(&u) && rows.contains(&v);
+        is_inside.then(|| (v - rows.start) * columns.len() + u - columns.start)
+    }
+
+    /// Returns whether the block of a pixel belongs to it. Pixels beyond the last whole block belong to that block.
+    fn has_block_of(&self, [x, y]: [usize; 2]) -> bool {
+        let block = [x / BLOCK, y / BLOCK];
+        let block = [0, 1].map(|axis| block[axis].min(self.all[axis] - 1));
+        self.index(block).is_some_and(|index| self.is_part[index])
     }
 
     /// Returns its bounding box in a level of a pyramid, with grey outside the region.
@@ -128,9 +130,8 @@ impl Region {
         scale: usize,
         value: T,
     ) {
-        let of_row = (y / BLOCK).min(self.rows - 1) * self.columns;
         for (pixels, x) in row.chunks_mut(BLOCK * scale).zip((x..).step_by(BLOCK)) {
-            if !self.is_part[of_row + (x / BLOCK).min(self.columns - 1)] {
+            if !self.has_block_of([x, y]) {
                 pixels.fill(value);
             }
         }
@@ -138,19 +139,37 @@ impl Region {
 
     /// Returns whether a position in the image, px, lies in it.
     pub(crate) fn contains(&self, at: DVec2) -> bool {
-        let [u, v] = [at.x, at.y].map(|c| c.max(0.0) as usize / BLOCK);
-        self.is_part[v.min(self.rows - 1) * self.columns + u.min(self.columns - 1)]
+        self.has_block_of(at.to_array().map(|c| c.max(0.0) as usize))
     }
 
-    /// Returns the columns and rows of pixels of its bounding box, with the pixels beyond the last whole block of the image.
+    /// Returns the columns and rows of pixels of its bounding box, with those beyond the last whole block of the image.
     pub(crate) fn bounds(&self) -> [Range<usize>; 2] {
-        let parts = || (0..self.is_part.len()).filter(|&i| self.is_part[i]);
-        let span = |of: &dyn Fn(usize) -> usize| {
-            let first = parts().map(of).min().unwrap_or(0);
-            BLOCK * first..BLOCK * parts().map(of).max().map_or(0, |last| last + 2)
-        };
-        [span(&|i| i % self.columns), span(&|i| i / self.columns)]
+        [0, 1].map(|axis| {
+            let Range { start, end } = self.bounds[axis];
+            let beyond = if end == self.all[axis] { BLOCK } else { 0 };
+            BLOCK * start..BLOCK * end + beyond
+        })
     }
+}
+
+/// Returns connected regions of the blocks that are set, by rows.
+fn connected([columns, rows]: [usize; 2], mut is_set: Vec<bool>) -> Vec<Region> {
+    let mut regions = Vec::new();
+    for first in 0..is_set.len() {
+        let (mut blocks, mut reached) = (Vec::new(), vec![first]);
+        while let Some(i) = reached.pop() {
+            if std::mem::take(&mut is_set[i]) {
+                let [u, v] = [i % columns, i / columns];
+                blocks.push([u, v]);
+                reached.extend(near(v, 1, rows).map(|v| v * columns + u));
+                reached.extend(near(u, 1, columns).map(|u| v * columns + u));
+            }
+        }
+        if !blocks.is_empty() {
+            regions.push(Region::of([columns, rows], &blocks));
+        }
+    }
+    regions
 }
 
 /// Returns the indices up to `reach` from one, below `count`.
@@ -205,9 +224,17 @@ impl Blocks {
         Self { columns, rows, averages, is_taken }
     }
 
-    /// Returns the blocks that satisfy `is`, as connected regions.
+    /// Returns the blocks that satisfy `is`, and those around them, as connected regions.
     fn regions(&self, is: impl Fn(usize) -> bool) -> Vec<Region> {
-        Region::around(self.columns, self.rows, |i| !self.is_taken[i] && is(i)).connected()
+        let Self { columns, rows, .. } = *self;
+        let mut is_part = vec![false; columns * rows];
+        for i in (0..columns * rows).filter(|&i| !self.is_taken[i] && is(i)) {
+            let [u, v] = [i % columns, i / columns];
+            for row in near(v, AROUND, rows) {
+                is_part[row * columns..][near(u, AROUND, columns)].fill(true);
+            }
+        }
+        connected([columns, rows], is_part)
     }
 
     /// Returns where the image may show tiles of less than about 30 px that are at most twice as long as wide.
@@ -394,15 +421,17 @@ mod tests {
     }
 
     #[test]
-    fn regions_are_cut_out_and_grey_outside() {
+    fn connected_regions_are_cut_out_and_grey_outside() {
         let board = board(20.0, 17.0);
         let image = &board.levels()[0];
-        let region = Region::around(20, 15, |i| i == 3 * 20 + 5 || i == 9 * 20 + 12);
-        let [first, second] = &region.connected()[..] else { panic!("two regions") };
+        let mut is_set = vec![false; 20 * 15];
+        [(4, 2), (5, 2), (5, 3), (19, 14)].iter().for_each(|(u, v)| is_set[v * 20 + u] = true);
+        let [first, second] = &connected([20, 15], is_set)[..] else { panic!("two regions") };
         let cut = first.cut_from(image);
-        assert_eq!([cut.width(), cut.height()], [64, 64]);
-        assert_eq!([cut.at(0, 0), cut.at(47, 47)], [image.at(64, 32), image.at(111, 79)]);
-        assert_eq!([cut.at(50, 0), cut.at(0, 50)], [512, 512]);
-        assert_eq!(second.bounds()[1].start, 128);
+        assert_eq!([cut.width(), cut.height()], [32, 32]);
+        assert_eq!([cut.at(0, 0), cut.at(31, 31)], [image.at(64, 32), image.at(95, 63)]);
+        assert_eq!(cut.at(15, 16), 512);
+        assert_eq!(second.bounds(), [304..336, 224..256]);
+        assert_eq!(second.cut_from(image).width(), 16);
     }
 }
