@@ -15,7 +15,7 @@
 //!
 //! `adjusted` runs 4 to 7 on all views. `solve` wraps it and holds out frames; `automatic` selects
 //! a model with `solve`; `located` computes the pose of a target. `compare` and `next_view` read
-//! estimates. Every module may import `model` (lens models), `matrix` (in results), `error`
+//! estimates; `selection` selects frames of a recording by the gain of `next_view`. Every module may import `model` (lens models), `matrix` (in results), `error`
 //! (failures), `excluded` (excluded views and the reasons) and `cancel`; otherwise a module imports
 //! only from modules above it in this list.
 //!
@@ -49,6 +49,7 @@ mod matrix;
 mod model;
 mod next_view;
 mod problem;
+mod selection;
 mod solve;
 mod start;
 mod uncertainty;
@@ -89,5 +90,6 @@ pub use model::{Model, ModelError};
 pub use next_view::guide::{Guide, Guided, NextView, ProposedCorner};
 pub use next_view::holding::{HoldStatus, HoldTracker};
 pub use problem::shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};
+pub use selection::keyframes::{Keyframe, Keyframes};
 pub use start::symmetry::LabelRotation;
 pub use uncertainty::projection::{ObservedCovariance, ProjectionUncertainty, Source};

@@ -176,6 +176,20 @@ const MODELS: [Facts; 9] = [
     },
 ];
 
+/// Names in other programs: OpenCV, ROS, Kalibr, COLMAP and mrcal. Case does not matter, and `_` equals `-`.
+const ELSEWHERE: [(Model, &[&str]); 7] = [
+    (Model::Radtan, &["pinhole", "pinhole-radtan", "radial", "simple-radial", "opencv4"]),
+    (Model::Radtan5, &["opencv", "opencv5", "plumb-bob", "brown", "brown-conrady"]),
+    (Model::Rational, &["rational-polynomial", "full-opencv", "opencv8"]),
+    (Model::ThinPrism, &["opencv12"]),
+    (
+        Model::KannalaBrandt(TERMS),
+        &["fisheye", "opencv-fisheye", "equidistant", "equi", "pinhole-equi", "kb4"],
+    ),
+    (Model::DoubleSphere, &["ds", "ds-none"]),
+    (Model::SPLINE, &["splined-stereographic"]),
+];
+
 /// The candidates of automatic model selection. Of two equally good models with the same number of parameters, the first is
 /// selected.
 pub(super) const TRIED: [Model; 10] = [
@@ -213,6 +227,21 @@ impl Model {
     /// Returns the list of all models with their descriptions, for a sentence.
     pub fn choice() -> String {
         listed(|facts| facts.help)
+    }
+
+    /// Returns the model that has this name in OpenCV, ROS, Kalibr, COLMAP or mrcal; `None` for own and unknown names.
+    pub fn named_elsewhere(name: &str) -> Option<Self> {
+        let name = name.to_lowercase().replace('_', "-");
+        let name = name.strip_prefix("lensmodel-").unwrap_or(&name);
+        ELSEWHERE.iter().find(|(_, names)| names.contains(&name)).map(|(model, _)| *model)
+    }
+
+    /// Returns its name with its description, such as `radtan (k1 k2 p1 p2)`.
+    pub fn described(self) -> String {
+        match self.facts().help {
+            "" => self.to_string(),
+            help => format!("{self} ({help})"),
+        }
     }
 
     fn facts(self) -> &'static Facts {

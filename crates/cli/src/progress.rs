@@ -64,3 +64,60 @@ impl SearchProgress {
         self.bar.finish_and_clear();
     }
 }
+
+/// Progress over frames: a line on a terminal, otherwise one every ten seconds.
+pub struct FrameProgress {
+    bar: ProgressBar,
+    /// Number of frames, if known.
+    total: Option<usize>,
+    frames: usize,
+    /// Number of frames that show a target.
+    seen: usize,
+    start: Instant,
+    /// Time of the last line; `None` on a terminal.
+    last: Option<Instant>,
+}
+
+impl FrameProgress {
+    /// Creates a progress display for this number of frames, if it is known.
+    pub fn new(total: Option<usize>) -> Self {
+        let style = ProgressStyle::with_template("{elapsed_precise}  {msg}");
+        let bar =
+            ProgressBar::new_spinner().with_style(style.expect("the template is well formed"));
+        let start = Instant::now();
+        let last = (!std::io::stderr().is_terminal()).then_some(start);
+        Self { bar, total, frames: 0, seen: 0, start, last }
+    }
+
+    /// Counts a frame. `part` is the fraction of the recording up to it, if known.
+    pub fn add(&mut self, is_seen: bool, part: Option<f64>) {
+        self.frames += 1;
+        self.seen += usize::from(is_seen);
+        let part = part.or(self.total.map(|total| self.frames as f64 / total.max(1) as f64));
+        if let Some(last) = &mut self.last {
+            if last.elapsed() < SearchProgress::EVERY {
+                return;
+            }
+            *last = Instant::now();
+            log!("{}", self.line(part));
+        } else {
+            self.bar.set_message(self.line(part));
+        }
+    }
+
+    /// Describes the progress.
+    fn line(&self, part: Option<f64>) -> String {
+        let elapsed = self.start.elapsed().as_secs_f64();
+        let left = part.filter(|part| *part > 0.0).map(|part| elapsed * (1.0 - part) / part);
+        let left = left.map(|left| format!(", about {left:.0} s left")).unwrap_or_default();
+        let frames = counted(self.frames, "frame");
+        let rate = self.frames as f64 / elapsed.max(1e-3);
+        format!("{frames}, {} with the target, {rate:.1} frames/s{left}", self.seen)
+    }
+
+    /// Removes the line, and reports the number of frames.
+    pub fn end(self) {
+        self.bar.finish_and_clear();
+        log!("{}", self.line(None));
+    }
+}

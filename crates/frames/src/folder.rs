@@ -33,6 +33,11 @@ pub(crate) fn is_heic(path: &Path) -> bool {
     ["heic", "heif", "hif"].contains(&extension(path).as_str())
 }
 
+/// Whether a path has the extension of a photograph.
+pub fn is_photograph(path: &Path) -> bool {
+    PHOTOGRAPHS.contains(&extension(path).as_str())
+}
+
 /// Whether a path is a video, a recording of a robot, or the folder of one.
 pub fn is_recording(path: &Path) -> bool {
     let extension = extension(path);

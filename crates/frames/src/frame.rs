@@ -12,12 +12,20 @@ use crate::problem::FramesError;
 pub struct Frame {
     path: PathBuf,
     time_ns: Option<i64>,
+    /// Fraction of the recording up to this frame.
+    part: Option<f64>,
     content: Content,
 }
 
 impl Frame {
     pub(crate) fn new(path: PathBuf, time_ns: Option<i64>, content: Content) -> Self {
-        Self { path, time_ns, content }
+        Self { path, time_ns, part: None, content }
+    }
+
+    /// Sets the duration of the recording, ns; 0 if it is not known.
+    pub(crate) fn of_recording(self, duration_ns: i64) -> Self {
+        let part = |time: i64| (time as f64 / duration_ns as f64).clamp(0.0, 1.0);
+        Self { part: self.time_ns.filter(|_| duration_ns > 0).map(part), ..self }
     }
 
     /// A photograph in a file. The file is opened by [`read`](Self::read).
@@ -50,6 +58,11 @@ impl Frame {
     /// clock; in a video, since its start. Photographs have none.
     pub fn time_ns(&self) -> Option<i64> {
         self.time_ns
+    }
+
+    /// Returns the fraction of the recording up to this frame, for videos whose duration is known.
+    pub fn part(&self) -> Option<f64> {
+        self.part
     }
 
     /// Returns the number of pixels, if it is known without decoding.

@@ -1,6 +1,8 @@
 //! The frames of a path.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
 
 use deltille_files::limits::Limits;
 
@@ -42,10 +44,14 @@ enum Kind {
 /// Time stamps, ns, and contents.
 type Stream = Box<dyn Iterator<Item = Result<(Option<i64>, Content), Problem>> + Send>;
 
+/// The duration of a recording, ns; 0 while it is not known.
+type Duration = Arc<AtomicI64>;
+
 struct Recording {
     path: PathBuf,
     /// The frames; `None` after the end.
     stream: Option<Stream>,
+    duration: Duration,
     /// Number of frames so far.
     count: u64,
     every: u64,
@@ -61,10 +67,12 @@ impl Frames {
         let path = path.as_ref();
         let failed = |problem| FramesError::Recording { path: path.to_owned(), problem };
         if folder::is_recording(path) {
-            let stream = Some(open(path, options).map_err(failed)?);
+            let duration = Duration::default();
+            let stream = Some(open(path, options, &duration).map_err(failed)?);
             let every = options.every.max(1);
             let path = path.to_owned();
-            return Ok(Self(Kind::Recording(Recording { path, stream, count: 0, every })));
+            let recording = Recording { path, stream, duration, count: 0, every };
+            return Ok(Self(Kind::Recording(recording)));
         }
         if !path.is_dir() {
             return Ok(Self(Kind::Photographs(vec![path.to_owned()].into_iter())));
@@ -97,7 +105,9 @@ impl Recording {
                 Some(Ok((time_ns, content))) => {
                     self.count += 1;
                     if number.is_multiple_of(self.every) {
-                        return Some(Ok(Frame::new(self.path_of(number), time_ns, content)));
+                        let frame = Frame::new(self.path_of(number), time_ns, content);
+                        let duration = self.duration.load(Ordering::Relaxed);
+                        return Some(Ok(frame.of_recording(duration)));
                     }
                 }
                 Some(Err(problem)) => {
@@ -125,7 +135,8 @@ impl Recording {
     }
 }
 
-fn open(path: &Path, options: &FrameOptions) -> Result<Stream, Problem> {
+#[allow(unused_variables, reason = "depends on the features")]
+fn open(path: &Path, options: &FrameOptions, duration: &Duration) -> Result<Stream, Problem> {
     match folder::extension(path).as_str() {
         #[cfg(any(feature = "mcap", feature = "rosbag1"))]
         "mcap" | "bag" | "active" | "db3" => {
@@ -136,10 +147,10 @@ fn open(path: &Path, options: &FrameOptions) -> Result<Stream, Problem> {
             crate::bag::open_folder(path, options.topic.as_deref(), &options.limits)
         }
         #[cfg(feature = "video")]
-        "y4m" => y4m(path, &options.limits),
+        "y4m" => y4m(path, &options.limits, duration),
         #[cfg(feature = "video")]
         _ => {
-            let video = crate::video::Video::open(path, true, &options.limits)?;
+            let video = crate::video::Video::open(path, true, &options.limits, duration)?;
             Ok(Box::new(video.map(|frame| frame.map(|(time, image)| (time, Content::Gray(image))))))
         }
         #[allow(unreachable_patterns, reason = "depends on the features")]
@@ -148,11 +159,13 @@ fn open(path: &Path, options: &FrameOptions) -> Result<Stream, Problem> {
 }
 
 #[cfg(feature = "video")]
-fn y4m(path: &Path, limits: &Limits) -> Result<Stream, Problem> {
+fn y4m(path: &Path, limits: &Limits, duration: &Duration) -> Result<Stream, Problem> {
     let file = std::fs::File::open(path).map_err(Problem::Io)?;
+    let bytes = file.metadata().map_or(0, |about| about.len());
     let Some(mut video) = crate::y4m::Y4m::open(std::io::BufReader::new(file), limits)? else {
         return Err(Problem::Damaged("an empty file (0 bytes)".to_owned()));
     };
+    duration.store(video.time_ns(video.frames_in(bytes)).unwrap_or(0), Ordering::Relaxed);
     let mut number = 0..;
     Ok(Box::new(std::iter::from_fn(move || {
         let frame = video.next_frame().transpose()?;

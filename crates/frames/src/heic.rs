@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
+use std::sync::Arc;
 
 use deltille_core::raster::AnyGray;
 use deltille_files::limits::Limits;
@@ -22,7 +23,7 @@ pub(crate) fn read(path: &Path, limits: &Limits) -> Result<AnyGray, Problem> {
     let mut head = Vec::new();
     let file = File::open(path).map_err(Problem::Io)?;
     file.take(HEAD_BYTES).read_to_end(&mut head).map_err(Problem::Io)?;
-    let mut frames = match Video::open(path, false, limits) {
+    let mut frames = match Video::open(path, false, limits, &Arc::default()) {
         Err(Problem::NoFfmpeg) => {
             return Err(refused("which is read only if ffmpeg 7 or newer is installed"));
         }

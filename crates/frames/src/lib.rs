@@ -44,7 +44,7 @@ mod video;
 #[cfg(feature = "video")]
 mod y4m;
 
-pub use folder::{is_recording, photographs_in, unread_in};
+pub use folder::{is_photograph, is_recording, photographs_in, unread_in};
 pub use frame::Frame;
 pub use frames::{FrameOptions, Frames};
 pub use problem::{FramesError, Problem};

@@ -6,6 +6,8 @@
 use std::io::{BufRead, BufReader, ErrorKind};
 use std::path::Path;
 use std::process::{Child, ChildStderr, ChildStdout, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 
@@ -37,8 +39,14 @@ pub(crate) struct Video {
 }
 
 impl Video {
-    /// Starts ffmpeg. With `is_rotated`, frames are rotated as the metadata states.
-    pub(crate) fn open(path: &Path, is_rotated: bool, limits: &Limits) -> Result<Self, Problem> {
+    /// Starts ffmpeg. With `is_rotated`, frames are rotated as the metadata states. Sets the duration, ns, as soon as it is
+    /// known.
+    pub(crate) fn open(
+        path: &Path,
+        is_rotated: bool,
+        limits: &Limits,
+        duration: &Arc<AtomicI64>,
+    ) -> Result<Self, Problem> {
         // A missing file is not a problem of ffmpeg.
         std::fs::File::open(path).map_err(Problem::Io)?;
         let mut file = std::ffi::OsString::from("file:");
@@ -60,7 +68,9 @@ impl Video {
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = command.spawn().map_err(not_started)?;
         let (sender, times) = channel();
-        let log = child.stderr.take().map(|log| thread::spawn(move || read_log(log, &sender)));
+        let duration = Arc::clone(duration);
+        let read = move |log| thread::spawn(move || read_log(log, &sender, &duration));
+        let log = child.stderr.take().map(read);
         Ok(Self { child, frames: None, times, log, limits: *limits, has_ended: false })
     }
 
@@ -128,8 +138,8 @@ fn not_started(error: std::io::Error) -> Problem {
     }
 }
 
-/// Sends the time stamp of each frame, and returns the first error.
-fn read_log(log: ChildStderr, times: &Sender<Option<i64>>) -> Option<String> {
+/// Sends the time stamp of each frame, sets the duration, and returns the first error.
+fn read_log(log: ChildStderr, times: &Sender<Option<i64>>, duration: &AtomicI64) -> Option<String> {
     let (mut time_base, mut error) = (None, None);
     for line in BufReader::new(log).split(b'\n').map_while(Result::ok) {
         let line = String::from_utf8_lossy(&line);
@@ -141,6 +151,8 @@ fn read_log(log: ChildStderr, times: &Sender<Option<i64>>) -> Option<String> {
                 // The reader may have stopped.
                 let _ = times.send(time.and_then(|(pts, base)| in_ns(pts, base)));
             }
+        } else if let Some(ns) = after(line, "  Duration: ").and_then(clock_ns) {
+            duration.store(ns, Ordering::Relaxed);
         } else if let Some((_, what)) =
             line.split_once("[error] ").or_else(|| line.split_once("[fatal] "))
         {
@@ -162,6 +174,14 @@ fn ratio(text: &str) -> Option<[i64; 2]> {
     Some([seconds.parse().ok()?, parts.parse().ok().filter(|parts| *parts > 0)?])
 }
 
+/// Parses a duration such as `00:01:02.50,`, ns.
+fn clock_ns(text: &str) -> Option<i64> {
+    let parts = text.trim_end_matches(',').split(':');
+    let seconds = parts.map(|part| part.parse::<f64>().ok().filter(|part| *part >= 0.0));
+    let seconds = seconds.reduce(|all, part| Some(60.0 * all? + part?))??;
+    Some((1e9 * seconds) as i64)
+}
+
 /// Returns a time stamp in units of a time base, s, as ns.
 fn in_ns(pts: i64, [seconds, parts]: [i64; 2]) -> Option<i64> {
     let ns = i128::from(pts) * i128::from(seconds) * 1_000_000_000;
@@ -177,6 +197,8 @@ mod tests {
         let base = ratio("1001/30000,").unwrap();
         assert_eq!(in_ns(30_000, base), Some(1_001_000_000_000));
         assert_eq!(in_ns(1, base), Some(33_366_666));
+        assert_eq!(clock_ns("00:01:02.50,"), Some(62_500_000_000));
+        assert_eq!(clock_ns("N/A,"), None);
         assert_eq!(after("[x] n:   1 pts:   1001 pts_time:0.03", " pts:"), Some("1001"));
     }
 }

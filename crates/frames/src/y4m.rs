@@ -95,6 +95,12 @@ impl<R: BufRead> Y4m<R> {
         }))
     }
 
+    /// Returns the number of frames in a file of this size, bytes.
+    pub(crate) fn frames_in(&self, bytes: u64) -> u64 {
+        let luma = self.size.iter().product::<usize>() as u64 * if self.bits > 8 { 2 } else { 1 };
+        bytes / (luma + self.colour_bytes).max(1)
+    }
+
     /// Returns the time of a frame from the frame rate, ns.
     pub(crate) fn time_ns(&self, frame: u64) -> Option<i64> {
         let [number, seconds] = self.rate?.map(u128::from);

@@ -3,6 +3,7 @@ mod board_shape;
 mod cameras;
 mod commands;
 mod common_outliers;
+mod filming;
 mod guide;
 mod models;
 mod one_state;

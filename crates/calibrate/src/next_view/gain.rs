@@ -13,7 +13,7 @@
 //! translation of the scene, the same for a pose and for the alignment of
 //! [`uncertainty`](crate::uncertainty::projection).
 
-use glam::{DMat3, DVec2};
+use glam::{DMat3, DVec2, DVec3};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix};
 
 use super::body::{Body, Seen};
@@ -38,7 +38,7 @@ const EXPECTED_BEND: f64 = 0.02;
 
 /// The information about a camera from the views so far, and the projection uncertainty with
 /// another view.
-pub(super) struct Gain {
+pub(crate) struct Gain {
     /// The most likely camera, including areas where no corner was seen.
     pub camera: Camera,
     /// Indices of the estimated parameters.
@@ -51,6 +51,13 @@ pub(super) struct Gain {
     field: Field,
     /// Expected variance of a corner per axis, px².
     variance: f64,
+}
+
+/// The information of one view.
+pub(crate) struct ViewGain {
+    /// On the unknowns, with the pose of the view eliminated.
+    information: DMatrix<f64>,
+    sums: Sums,
 }
 
 /// Sums over corners, Jᵀ J of parameters and motion.
@@ -73,6 +80,14 @@ struct Field {
 impl Gain {
     /// From the estimate of a single camera; `None` if it lacks the information.
     pub(super) fn of(estimate: &Estimate, body: &Body) -> Option<Self> {
+        let mut gain = Self::without_views(estimate)?;
+        gain.known += &estimate.known.as_ref()?.information;
+        gain.sums = gain.seen_so_far(estimate.cameras.first()?, body);
+        Some(gain)
+    }
+
+    /// The camera of an estimate with the prior alone, as if it had no views.
+    pub(crate) fn without_views(estimate: &Estimate) -> Option<Self> {
         let [found] = estimate.cameras.as_slice() else { return None };
         let known = estimate.known.as_ref()?;
         let free = found.free();
@@ -84,17 +99,50 @@ impl Gain {
         let start = found.model.map(Model::lens);
         let (camera, expected) = believed(&found.camera, start, &free, known);
         let field = Field::of(&camera, &free)?;
-        let mut information = known.information.clone();
         let spread = shape.map_or(1.0, |shape| EXPECTED_BEND * shape.reach_mm);
-        for i in 0..unknowns {
-            let expected = expected.get(i).copied().unwrap_or(spread);
-            information[(i, i)] += expected.powi(-2);
-        }
+        let prior = |i: usize| expected.get(i).copied().unwrap_or(spread).powi(-2);
+        let prior = DMatrix::from_diagonal(&DVector::from_fn(unknowns, |i, _| prior(i)));
         let variance = known.corner_variance_px2;
         let sums = Sums::zeros(unknowns);
-        let mut gain = Self { camera, free, shape, known: information, sums, field, variance };
-        gain.sums = gain.seen_so_far(found, body);
-        Some(gain)
+        Some(Self { camera, free, shape, known: prior, sums, field, variance })
+    }
+
+    /// The information of a view of these points, each with its position in the camera frame, mm, and the variance of its
+    /// corner per axis, px². `None` if they do not determine the pose.
+    pub(crate) fn of_corners(
+        &self,
+        corners: impl Iterator<Item = (DVec3, f64)>,
+    ) -> Option<ViewGain> {
+        let mut sums = Sums::zeros(self.unknowns());
+        let mut row = DMatrix::zeros(2, self.unknowns());
+        for (point, variance) in corners {
+            let Some(at) = self.camera.project_with_derivatives(point) else { continue };
+            row.columns_mut(0, self.free.len()).copy_from(&by_parameters(&at, &self.free));
+            sums.add(&row, &by_motion(&at, point), self.variance / variance, true);
+        }
+        self.of_view(sums)
+    }
+
+    /// Eliminates the pose of a view.
+    fn of_view(&self, sums: Sums) -> Option<ViewGain> {
+        let through = solved(&sums.motion, &sums.across)?;
+        let information = (&sums.own - sums.across.tr_mul(&through)) / self.variance;
+        Some(ViewGain { information, sums })
+    }
+
+    /// The projection uncertainty with another view, px.
+    pub(crate) fn px_with(&self, view: &ViewGain) -> Option<f64> {
+        let mut aligned = self.sums.clone();
+        aligned.motion += view.sums.motion;
+        aligned.across += &view.sums.across;
+        self.px(&(&self.known + &view.information), &aligned)
+    }
+
+    /// Adds a view.
+    pub(crate) fn add(&mut self, view: &ViewGain) {
+        self.known += &view.information;
+        self.sums.motion += view.sums.motion;
+        self.sums.across += &view.sums.across;
     }
 
     /// Sums over the used corners.
@@ -147,13 +195,7 @@ impl Gain {
             }
             sums.add(&row, &by_motion(at, *point), *weight, true);
         }
-        let through = solved(&sums.motion, &sums.across)?;
-        let mut gained = &sums.own - sums.across.tr_mul(&through);
-        gained /= self.variance;
-        let mut aligned = sums;
-        aligned.motion += self.sums.motion;
-        aligned.across += &self.sums.across;
-        self.px(&(&self.known + gained), &aligned)
+        self.px_with(&self.of_view(sums)?)
     }
 
     fn px(&self, information: &DMatrix<f64>, sums: &Sums) -> Option<f64> {

@@ -304,7 +304,6 @@ fn calibrate_refuses_wrong_input() {
     }
     page.title("Options without effect, or in contradiction to each other or to the images");
     for args in [
-        "calibrate corners --target board.json",
         "calibrate corners --grid deltille --edge -20mm --model radtan",
         "calibrate corners --grid checker --edge 20mm --model radtan",
         "calibrate corners --target board.json --model radtan --print-scale -1,1",

@@ -1,17 +1,19 @@
 //! Calibration: from detections to cameras, rigs and measured targets.
 //!
-//! Input: detections from `see`, or photographs for `guide`. Output: camera files for other programs, the result as a
+//! Input: detections from `see`, photographs or recordings. Output: camera files for other programs, the result as a
 //! file and as a report, and diagnoses. The modules, in the order in which a command uses them:
 //!
 //! 1. `guide` proposes the next photograph to take.
 //! 2. `one_camera` is `deltille calibrate`, and `rig` is `deltille rig`: their options and files.
 //! 3. `sightings` reads the common input: detections, the target or untagged board, and the
 //!    properties of its print.
-//! 4. `solving` calls the library with a given or selected model, and prints the uncertainty of the result.
-//! 5. `report_page` writes the report, with the photographs that it shows.
-//! 6. `compare` tests whether two results differ significantly.
+//! 4. `filming` finds the target in photographs and recordings, instead of detections.
+//! 5. `solving` calls the library with a given or selected model, and prints the uncertainty of the result.
+//! 6. `report_page` writes the report, with the photographs that it shows.
+//! 7. `compare` tests whether two results differ significantly.
 
 pub mod compare;
+mod filming;
 pub mod guide;
 pub mod one_camera;
 mod report_page;

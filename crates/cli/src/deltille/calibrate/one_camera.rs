@@ -16,6 +16,7 @@ use crate::deltille::files::camera_file;
 use crate::deltille::files::written::{
     File, check_places, same_file, sample_of, text_file, write_all,
 };
+use crate::interrupt;
 use crate::output::{self, Overwrite, log};
 use crate::run::{FAILED, report};
 use crate::values::format;
@@ -36,9 +37,9 @@ pub struct Args {
     #[command(flatten)]
     sightings: SightingsArgs,
     /// The camera model.
-    #[arg(long, required_unless_present = "fixed_intrinsics", help = format!(
+    #[arg(long, help = format!(
         "Camera model: {}. All except spline also estimate fx, fy, cx, cy. auto: the simplest model whose held-out error \
-         is at most 5 % above the lowest",
+         is at most 5 % above the lowest. Names of other programs, such as plumb_bob or fisheye, are accepted [default: auto]",
         Model::choice()
     ))]
     model: Option<ModelChoice>,
@@ -86,7 +87,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let page = args.solve.page(&stem, args.overwrite)?;
     let measure = args.solve.measures_target();
     let Sightings { calibration, views, target, empty, left_out, print, unnamed } =
-        args.sightings.read(measure)?;
+        args.sightings.read(&intrinsics, measure)?;
     if let (Some(known), Some(printing)) = (&args.fixed_intrinsics, &target) {
         let targets = std::slice::from_ref(&printing.target);
         let is_assumed = args.sightings.assumes_target();
@@ -99,10 +100,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         check_images(folder, &views)?;
     }
     let mut calibration = calibration.camera(&stem, views, intrinsics);
-    let tried = match args.model {
-        Some(model) => model.choose(&mut calibration, 0)?,
-        None => Vec::new(),
-    };
+    let model = args.model.unwrap_or(ModelChoice::Auto);
+    let tried = model.choose(&mut calibration, 0)?;
     let listed = chosen(&tried);
     let mut solved = args.solve.solve(calibration, print, vec![tried])?;
     unnamed.iter().for_each(|note| log!("{note}"));
@@ -148,6 +147,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let _ = writeln!(text, "wrote {}", shown(&path.display().to_string()));
     }
     output::print(&text)?;
+    if interrupt::is_raised() {
+        return Ok(ExitCode::from(interrupt::exit_code()));
+    }
     Ok(formats_left_out(&refused).unwrap_or(solved.exit_code()))
 }
 
@@ -158,8 +160,8 @@ impl Args {
             let known = camera_file::read_to_keep("--fixed-intrinsics", path)?;
             return Ok((Intrinsics::Known(known.camera), known.calibrated_with));
         }
-        let sought = self.model.map(|model| Intrinsics::Unknown(model.richest()));
-        Ok((sought.context("--model or --fixed-intrinsics is needed")?, Vec::new()))
+        let model = self.model.unwrap_or(ModelChoice::Auto);
+        Ok((Intrinsics::Unknown(model.richest()), Vec::new()))
     }
 
     /// Returns the camera in all requested formats, and errors for those that failed; `json` is the complete result.

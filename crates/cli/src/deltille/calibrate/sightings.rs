@@ -6,13 +6,15 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow, bail, ensure};
 use clap::ValueEnum;
 
-use crate::deltille::files::limits::FileLimits;
+use super::filming::{self, FilmArgs};
+use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::{camera_file, detection_tables, target_file};
 use crate::output::log;
 use crate::values::whole;
 use deltille::SheetUseError;
 use deltille::calibrate::{
-    Calibration, Excluded, PanelPrior, Reason, Reference, UntaggedGrid, View, ViewSet, views,
+    Calibration, Excluded, Intrinsics, PanelPrior, Reason, Reference, UntaggedGrid, View, ViewSet,
+    views,
 };
 use deltille::detect::{Detection, InkEstimate};
 use deltille::export::calibration::Print;
@@ -29,9 +31,12 @@ use deltille_core::words::counted;
 /// Detections and their target.
 #[derive(clap::Args)]
 pub struct SightingsArgs {
-    /// Detections (.json or .parquet) from `deltille detect`, or folders of them
-    #[arg(required = true, value_name = "DETECTIONS")]
-    detections: Vec<PathBuf>,
+    /// A video, an MCAP file, a bag of ROS 1 or 2, photographs or a folder of them; or detections (.json or .parquet) from
+    /// `deltille detect`, or folders of them
+    #[arg(required = true, value_name = "INPUT")]
+    inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    film: FilmArgs,
     /// Target description: the .json of `deltille board`, or a .dsc
     #[arg(long, value_name = "FILE")]
     target: Option<PathBuf>,
@@ -43,7 +48,7 @@ pub struct SightingsArgs {
     #[command(flatten)]
     sheet: SheetArgs,
     #[command(flatten)]
-    limits: FileLimits,
+    limits: ImageLimits,
 }
 
 /// An untagged board without a description file.
@@ -145,8 +150,9 @@ impl SightingsArgs {
         self.assume_target
     }
 
-    /// Reads all input. To measure the target, only views with unambiguous labels are used.
-    pub fn read(&self, measure_target: bool) -> anyhow::Result<Sightings> {
+    /// Reads all input; of recordings, it selects the views to calibrate a camera with these intrinsics. To measure the target,
+    /// only views with unambiguous labels are used.
+    pub fn read(&self, intrinsics: &Intrinsics, measure_target: bool) -> anyhow::Result<Sightings> {
         let limits = self.limits.limits();
         let target = self.target.as_deref().map(|path| target_file::read_placed(path, &limits));
         let target: Option<Printing> = target.transpose().context("--target")?;
@@ -158,8 +164,12 @@ impl SightingsArgs {
             ),
         };
         let sheet = self.sheet.read(&limits, &reference.identities(), target.as_slice())?;
+        let given = match filming::are_images(&self.inputs)? {
+            true => self.film.see(&self.inputs, &reference, intrinsics, &limits)?,
+            false => given(&self.inputs, &limits)?,
+        };
         let Read { mut views, empty, mut left_out, ink, detections } =
-            read(&self.detections, &reference, &limits, self.assume_target)?;
+            given.read(&reference, self.assume_target)?;
         let board = match reference {
             Reference::Grid(grid) if measure_target => {
                 let made = grid
@@ -287,6 +297,18 @@ pub fn read(
     limits: &Limits,
     is_assumed: bool,
 ) -> anyhow::Result<Read> {
+    given(paths, limits)?.read(reference, is_assumed)
+}
+
+/// Detections before they are compared with a target.
+pub struct Given {
+    pub detections: Vec<(String, Detection)>,
+    /// The file of each detection.
+    pub files: Vec<PathBuf>,
+}
+
+/// Reads detection files or folders.
+fn given(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Given> {
     let (mut different, mut foreign) = (Different::default(), Vec::new());
     let mut copies = Vec::new();
     let Places { texts, tables } = places(paths)?;
@@ -320,7 +342,7 @@ pub fn read(
             copies.extend(different.add((name, found), path));
         }
     }
-    let Different { mut detections, files, .. } = different;
+    let Different { detections, files, .. } = different;
     if let Some((copy, first)) = copies.first() {
         let others = match copies.len() - 1 {
             0 => String::new(),
@@ -338,18 +360,26 @@ pub fn read(
         );
         log!("excluded: {count} in the folder without a detection, such as {}", first.display());
     }
-    if is_assumed {
-        assume(&mut detections, reference);
+    Ok(Given { detections, files })
+}
+
+impl Given {
+    /// Converts the detections to views.
+    fn read(self, reference: &Reference, is_assumed: bool) -> anyhow::Result<Read> {
+        let Self { mut detections, files } = self;
+        if is_assumed {
+            assume(&mut detections, reference);
+        }
+        let ViewSet { views, empty, excluded: left_out, .. } = views(&detections, reference)?;
+        for (index, out) in &left_out {
+            log!("warning: excluded: {}: {}", files[*index].display(), out.reason);
+        }
+        ensure!(!views.is_empty(), nothing_shown(&detections));
+        let empty = empty.into_iter().map(|index| files[index].clone()).collect();
+        let left_out = left_out.into_iter().map(|(_, out)| out).collect();
+        let ink = ink_of(&detections, reference);
+        Ok(Read { views, empty, left_out, ink, detections })
     }
-    let ViewSet { views, empty, excluded: left_out, .. } = views(&detections, reference)?;
-    for (index, out) in &left_out {
-        log!("warning: excluded: {}: {}", files[*index].display(), out.reason);
-    }
-    ensure!(!views.is_empty(), nothing_shown(&detections));
-    let empty = empty.into_iter().map(|index| files[index].clone()).collect();
-    let left_out = left_out.into_iter().map(|(_, out)| out).collect();
-    let ink = ink_of(&detections, reference);
-    Ok(Read { views, empty, left_out, ink, detections })
 }
 
 /// Assigns all detections to the given targets; notes once if they name another target.

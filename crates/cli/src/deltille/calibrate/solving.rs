@@ -94,6 +94,10 @@ impl FromStr for ModelChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        if let Some(model) = Model::named_elsewhere(text) {
+            log!("note: --model {text} is {} here", model.described());
+            return Ok(Self::Model(model));
+        }
         match text {
             "auto" => Ok(Self::Auto),
             _ => text.parse().map(Self::Model).map_err(|error: ModelError| {
