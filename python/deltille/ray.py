@@ -89,6 +89,7 @@ IMAGES = pa.schema(
         ("error", pa.string()),
         ("targets", pa.string()),
         ("time_ns", pa.int64()),
+        ("camera", pa.string()),
     ],
     metadata={"deltille.schema": "deltille/images/1"},
 )
@@ -448,6 +449,8 @@ class _Rows:
         }
         if found.target_identities:
             picture["targets"] = json.dumps(found.target_identities)
+        if found.camera is not None:
+            picture["camera"] = json.dumps(found.camera)
         if reasons:
             picture["why"] = reasons[0]["kind"]
             picture["why_text"] = "; ".join(str(reason) for reason in found.reasons)

@@ -82,6 +82,7 @@ pub use input::observation::Observation;
 pub use input::observation::{Sighting, View};
 pub use input::panel::PanelPrior;
 pub use input::panel::PanelRef;
+pub use input::photographs::{Differing, MixedPhotographs};
 pub use input::reference::Reference;
 pub use input::views::{Named, ViewSet, views};
 pub use input::weights::Weights;

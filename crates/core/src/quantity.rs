@@ -207,6 +207,8 @@ quantities! {
     variance_px2: 1e-20 to 1e8 "px²";
     /// A focal length.
     focal_px: 0.1 to 1e8 "px";
+    /// A focal length in the metadata of a photograph.
+    nominal_focal_mm: 0.1 to 1e5 "mm";
     /// A coefficient of a lens.
     coefficient: -1e9 to 1e9 "";
     /// α of the models eucm and double-sphere.

@@ -10,6 +10,7 @@
 //! | [`target_file`] | targets from their files, with their families |
 //! | [`camera_file`] | cameras from their files |
 //! | [`photograph`] | photographs in common formats as grey images |
+//! | `exif_notes` | the camera in the EXIF metadata of a photograph |
 //! | `remap` | photographs undistorted or rectified |
 //! | `known_print` | known properties of a print (scale, bend, panel poses), applied to views |
 //! | [`logo`] | logos from SVG |
@@ -18,6 +19,8 @@
 
 pub mod camera_file;
 pub mod clock;
+#[cfg(feature = "photographs")]
+mod exif_notes;
 pub mod export;
 pub mod family_file;
 mod known_print;

@@ -27,6 +27,7 @@ use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
+use crate::exif_notes;
 use crate::limits::{self, Exceeded, Limits};
 use deltille_core::raster::{AnyGray, Colours, FileNotes, Gray, Intensity};
 use deltille_core::setting::Setting::{LimitsMaxPixels, PhotographReadWithNotes};
@@ -61,7 +62,7 @@ const SURPLUS_BYTES: usize = 3;
 pub struct Photograph {
     /// The grey values, in sensor orientation.
     pub image: AnyGray,
-    /// EXIF orientation and damage of the file.
+    /// EXIF orientation, camera, and damage of the file.
     pub notes: FileNotes,
 }
 
@@ -214,6 +215,7 @@ fn decoded(
         file.check_pages()?;
         let mut decoder = file.decoder(limits)?;
         let orientation = decoder.orientation().map_or(1, Orientation::to_exif);
+        let camera = decoder.exif_metadata().ok().flatten().and_then(exif_notes::camera);
         let (image, damage) = match file.jpeg() {
             Ok(Some(image)) => (image, None),
             Ok(None) => (DynamicImage::from_decoder(decoder).map_err(decode)?, None),
@@ -223,7 +225,7 @@ fn decoded(
             Err(problem) => (DynamicImage::from_decoder(decoder).map_err(decode)?, Some(problem)),
         };
         let exif_orientation = (orientation != 1).then_some(orientation);
-        Ok((image, FileNotes { exif_orientation, damage }))
+        Ok((image, FileNotes { exif_orientation, camera, damage }))
     })
     .map_err(broken)?
 }

@@ -18,7 +18,7 @@ use pyo3::prelude::*;
 use serde_json::Value;
 
 use crate::boundary::arrays::{number, vector, whole};
-use crate::boundary::errors::{self, Raise, raised};
+use crate::boundary::errors::{self, Raise, raised, warn};
 use crate::boundary::interrupt::interruptible;
 use crate::see::detection::{Detection, Targets};
 use crate::see::detector::{size, tiling};
@@ -388,6 +388,9 @@ pub fn solve(
             }
             named.extend(camera.detections.iter().flat_map(|(_, found)| found.targets.clone()));
             let shown = views(&camera.detections, &reference).raise(errors::calibration)?;
+            if let Some(mixed) = &shown.mixed {
+                warn(py, &format!("{}: {mixed}", camera.name))?;
+            }
             let mut of_camera: Vec<View> = shown.views;
             let name = is_named.then(|| camera.name.clone());
             left_out.extend(

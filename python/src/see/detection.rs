@@ -459,6 +459,13 @@ impl Detection {
         self.found.file.exif_orientation
     }
 
+    /// Camera, lens and focal length in the EXIF metadata, those of ``make``, ``model``, ``serial``, ``lens``,
+    /// ``focal_mm`` and ``focal_35mm_mm`` that are known; ``None`` if there are none.
+    #[getter]
+    fn camera<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.found.file.camera.as_ref().map(|camera| record(py, camera)).transpose()
+    }
+
     /// Why some pixels are missing from the file; ``None`` for an intact file.
     #[getter]
     fn damage(&self) -> Option<&str> {

@@ -69,7 +69,10 @@ fn detections(target: &Target) -> Vec<Detection> {
         found.ink = serde_json::from_value(ink).unwrap();
         found.tone = serde_json::from_value(tone).unwrap();
         found.reasons = serde_json::from_value(reasons).unwrap();
-        found.file = serde_json::from_value(json!({ "exif_orientation": 6 })).unwrap();
+        found.file = serde_json::from_value(json!({
+            "exif_orientation": 6, "camera": {"model": "EOS R6", "focal_mm": 24.0 / 7.0},
+        }))
+        .unwrap();
         found.time_ns = Some(1_700_000_000_000_000_123 + index as i64);
         found
     };

@@ -163,6 +163,31 @@ fn pixels_stay_in_sensor_orientation() {
     }
 }
 
+/// EXIF of a camera, lens and focal length, as piexif 1.1.3 writes them.
+const EXIF_OF_CAMERA: &[u8] = b"Exif\0\0MM\0*\0\0\0\x08\0\x03\x01\x0f\0\x02\0\0\0\x06\0\0\x002\x01\x10\0\x02\0\0\0\r\0\0\08\x87i\0\x04\0\0\0\x01\0\0\0E\0\0\0\0Canon\0Canon EOS R6\0\0\x04\x92\n\0\x05\0\0\0\x01\0\0\0w\xa4\x05\0\x03\0\0\0\x01\0\x18\0\0\xa41\0\x02\0\0\0\r\0\0\0\x7f\xa44\0\x02\0\0\0\x17\0\0\0\x8c\0\0\0\x18\0\0\0\x01012345678901\0RF24-105mm F4 L IS USM\0";
+
+/// The camera is read from a JPEG, and from a PNG with the same metadata.
+#[test]
+fn the_camera_of_a_photograph_is_noted() {
+    let folder = Folder::new();
+    let (jpeg, png) = (encoded(ImageFormat::Jpeg), encoded(ImageFormat::Png));
+    let length = (EXIF_OF_CAMERA.len() + 2) as u16;
+    let jpeg =
+        [&jpeg[..2], &[0xFF, 0xE1], &length.to_be_bytes(), EXIF_OF_CAMERA, &jpeg[2..]].concat();
+    let head = 8 + 25;
+    let png = [&png[..head], &chunk(b"eXIf", &EXIF_OF_CAMERA[6..]), &png[head..]].concat();
+    for whole in [jpeg, png] {
+        let notes = folder.read(&whole, false).unwrap().notes;
+        assert_eq!(
+            serde_json::to_value(notes).unwrap(),
+            serde_json::json!({"camera": {
+                "make": "Canon", "model": "Canon EOS R6", "serial": "012345678901",
+                "lens": "RF24-105mm F4 L IS USM", "focal_mm": 24.0, "focal_35mm_mm": 24.0,
+            }})
+        );
+    }
+}
+
 #[test]
 fn colour_profiles_and_gamma_do_not_change_pixels() {
     let (folder, whole) = (Folder::new(), encoded(ImageFormat::Png));

@@ -42,7 +42,7 @@ impl Picture {
             Gray::from_vec(width, height, grey).map(AnyGray::U8)
         };
         let exif_orientation = (orientation != 1).then_some(orientation);
-        let notes = FileNotes { exif_orientation, damage: None };
+        let notes = FileNotes { exif_orientation, ..FileNotes::default() };
         Ok(Self { image: image.ok_or_else(wrong_size)?, notes })
     }
 

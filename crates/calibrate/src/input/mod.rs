@@ -5,6 +5,7 @@
 //!
 //! 1. `reference` describes one target, several targets, or an untagged board (`grid`), and checks labels against it.
 //! 2. `views` converts all detections and checks them for image sizes, duplicates, wrong labels and mirrored images.
+//!    `photographs` groups them by the camera that their EXIF metadata name.
 //! 3. `observation` is the content of an image: corners of panels (`panel`).
 //! 4. `calibration` collects cameras with their views and the settings, including `loss` and
 //!    `weights`.
@@ -17,6 +18,7 @@ pub(crate) mod loss;
 pub(crate) mod observation;
 pub(crate) mod order;
 pub(crate) mod panel;
+pub(crate) mod photographs;
 pub(crate) mod reference;
 pub(crate) mod sample;
 pub(crate) mod views;

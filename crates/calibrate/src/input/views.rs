@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, HashMap};
 use glam::DVec2;
 
 use super::observation::{MIN_CORNERS, Sighting, View};
+use super::photographs::MixedPhotographs;
 use super::reference::Reference;
 use crate::error::CalibrationError;
 use crate::excluded::{Excluded, Reason};
@@ -31,6 +32,8 @@ pub struct ViewSet {
     pub empty: Vec<usize>,
     /// Indices of the detections that are not of the target or duplicate another image, with the reason.
     pub excluded: Vec<(usize, Excluded)>,
+    /// Cameras, lenses or focal lengths, if the photographs of the views were taken with several.
+    pub mixed: Option<MixedPhotographs>,
 }
 
 /// A detection and the name of its view: the name of its image, or another name. Views of several
@@ -89,6 +92,7 @@ fn views_of(detections: &[Named], reference: &Reference) -> Result<ViewSet, Cali
     let mut views = Vec::new();
     let mut empty = Vec::new();
     let mut left_out = Vec::new();
+    let mut notes = Vec::new();
     let mut first_wrong = None;
     let mut wrong = 0;
     let mut copies = 0;
@@ -128,6 +132,7 @@ fn views_of(detections: &[Named], reference: &Reference) -> Result<ViewSet, Cali
             }
             Ok(sightings) if sightings.is_empty() => empty.push(index),
             Ok(sightings) if reference.is_loose() => {
+                notes.extend(&detection.file.camera);
                 views.extend(sightings.into_iter().map(|sighting| View {
                     name: format!("{name} board {}", sighting.panel),
                     image: detection.image.clone(),
@@ -136,6 +141,7 @@ fn views_of(detections: &[Named], reference: &Reference) -> Result<ViewSet, Cali
                 }));
             }
             Ok(sightings) => {
+                notes.extend(&detection.file.camera);
                 let (name, image) = (name.to_owned(), detection.image.clone());
                 views.push(View { name, image, size_px, sightings });
             }
@@ -147,7 +153,10 @@ fn views_of(detections: &[Named], reference: &Reference) -> Result<ViewSet, Cali
             1 => first,
             _ => CalibrationError::MostWrong { first: Box::new(first), wrong, all },
         }),
-        _ => Ok(ViewSet { views, empty, excluded: left_out }),
+        _ => {
+            let mixed = MixedPhotographs::of(&notes);
+            Ok(ViewSet { views, empty, excluded: left_out, mixed })
+        }
     }
 }
 

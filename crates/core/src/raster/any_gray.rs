@@ -2,15 +2,18 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Gray;
+use super::{CameraNotes, Gray};
 
 /// Metadata of a photograph's file.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FileNotes {
     /// EXIF orientation, from 2 to 8: how a viewer rotates or flips the pixels; `None` if they are shown unchanged.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exif_orientation: Option<u8>,
+    /// The camera that the EXIF metadata name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<CameraNotes>,
     /// Why some pixels do not come from the file, if it is damaged.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub damage: Option<String>,

@@ -200,6 +200,25 @@ fn a_repeated_folder_is_reported_in_one_line() {
 }
 
 #[test]
+fn photographs_of_two_cameras_are_named_in_one_warning() {
+    let target = board(6, 7);
+    let mut seen = detections(&target, 10, 0.5);
+    for (index, found) in seen.iter_mut().enumerate() {
+        let model = if index < 3 { "R5\u{1b}[2J" } else { "R6" };
+        let file = serde_json::json!({"camera": {"make": "Canon", "model": model, "focal_mm": 24}});
+        found.file = serde_json::from_value(file).unwrap();
+    }
+    let at = folder(&target, &seen);
+    let result =
+        output(at.path(), "calibrate corners --target board.json --model radtan -o camera.yaml");
+    let said = String::from_utf8(result.stderr).unwrap();
+    let line = "warning: corners: photographs of 2 cameras: Canon R5\\u{1b}[2J (3 images), Canon R6 (7 images); calibrate \
+                each camera separately\n";
+    assert_eq!(said.matches("photographs").count(), 1, "{said}");
+    assert!(said.contains(line), "{said}");
+}
+
+#[test]
 fn a_file_without_a_board_shape_is_refused_with_advice() {
     let folder = folder(&board(8, 9), &detections(&board(8, 9), 6, 0.7));
     let at = folder.path();

@@ -370,7 +370,11 @@ impl Given {
         if is_assumed {
             assume(&mut detections, reference);
         }
-        let ViewSet { views, empty, excluded: left_out, .. } = views(&detections, reference)?;
+        let ViewSet { views, empty, excluded: left_out, mixed, .. } =
+            views(&detections, reference)?;
+        if let Some(mixed) = mixed {
+            log!("warning: {mixed}");
+        }
         for (index, out) in &left_out {
             log!("warning: excluded: {}: {}", files[*index].display(), out.reason);
         }

@@ -91,7 +91,7 @@ pub(super) const CORNERS: [Column; 17] = [
 ];
 
 /// A row for each image.
-pub(super) const IMAGES: [Column; 26] = [
+pub(super) const IMAGES: [Column; 27] = [
     column("image", Kind::Text),
     column("width", Kind::Signed).gaps(),
     column("height", Kind::Signed).gaps(),
@@ -118,4 +118,5 @@ pub(super) const IMAGES: [Column; 26] = [
     column("error", Kind::Text).gaps().extra(),
     column("targets", Kind::Text).gaps().extra(),
     column("time_ns", Kind::Long).gaps().extra(),
+    column("camera", Kind::Text).gaps().extra(),
 ];

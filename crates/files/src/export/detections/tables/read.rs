@@ -241,7 +241,10 @@ impl Reader {
                 let exif_orientation = row.unsigned(21)?.map(u8::try_from).transpose();
                 let exif_orientation =
                     exif_orientation.map_err(|_| row.wrong(21, "not from 2 to 8"))?;
-                found.file = FileNotes { exif_orientation, damage: owned(row.text(22)?) };
+                let camera = owned(row.text(26)?).map(|json| serde_json::from_str(&json));
+                let camera = camera.transpose().map_err(|error| row.wrong(26, error))?;
+                let damage = owned(row.text(22)?);
+                found.file = FileNotes { exif_orientation, camera, damage };
                 if let Some(json) = owned(row.text(24)?) {
                     let targets: Result<Vec<TargetIdentity>, _> = serde_json::from_str(&json);
                     found.targets = targets.map_err(|error| row.wrong(24, error))?;

@@ -174,6 +174,7 @@ fn picture_row(picture: &ImageRecord) -> [Cell; column::IMAGES.len()] {
     let tone = found.and_then(|found| found.tone);
     let ink = found.and_then(|found| found.ink);
     let file = found.map(|found| &found.file);
+    let camera = file.and_then(|file| file.camera.as_ref());
     [
         text(&picture.image),
         whole(found.map(|found| found.width)),
@@ -201,6 +202,7 @@ fn picture_row(picture: &ImageRecord) -> [Cell; column::IMAGES.len()] {
         picture.found.as_ref().err().map_or(Cell::None, |why| text(why)),
         targets.map_or(Cell::None, |all| to_json(serde_json::to_value(all))),
         whole(found.and_then(|found| found.time_ns)),
+        camera.map_or(Cell::None, |camera| to_json(serde_json::to_value(camera))),
     ]
 }
 
