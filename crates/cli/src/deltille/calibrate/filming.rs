@@ -88,7 +88,7 @@ impl FilmArgs {
             film.see_again(&detector, &mut detections)?;
         }
         let files = detections.iter().map(|(name, _)| PathBuf::from(name)).collect();
-        Ok(Given { detections, files })
+        Ok(Given { detections, files, first: inputs[0].clone() })
     }
 }
 

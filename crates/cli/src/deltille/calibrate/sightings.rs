@@ -305,6 +305,8 @@ pub struct Given {
     pub detections: Vec<(String, Detection)>,
     /// The file of each detection.
     pub files: Vec<PathBuf>,
+    /// The first path on the command line.
+    pub first: PathBuf,
 }
 
 /// Reads detection files or folders.
@@ -360,20 +362,20 @@ fn given(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Given> {
         );
         log!("excluded: {count} in the folder without a detection, such as {}", first.display());
     }
-    Ok(Given { detections, files })
+    Ok(Given { detections, files, first: paths[0].clone() })
 }
 
 impl Given {
     /// Converts the detections to views.
     fn read(self, reference: &Reference, is_assumed: bool) -> anyhow::Result<Read> {
-        let Self { mut detections, files } = self;
+        let Self { mut detections, files, first } = self;
         if is_assumed {
             assume(&mut detections, reference);
         }
         let ViewSet { views, empty, excluded: left_out, mixed, .. } =
             views(&detections, reference)?;
         if let Some(mixed) = mixed {
-            log!("warning: {mixed}");
+            log!("warning: {}: {mixed}", first.display());
         }
         for (index, out) in &left_out {
             log!("warning: excluded: {}: {}", files[*index].display(), out.reason);
