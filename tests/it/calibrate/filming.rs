@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::common::command::deltille;
 use crate::common::page::Page;
-use deltille::camera::{Camera, Lens, Pose};
+use deltille::camera::{BrownConrady, Camera, Lens, Pose};
 use deltille::glam::{DQuat, DVec3};
 use deltille::synth::{Light, scene_of_target};
 use deltille::targets::{BoardSpec, Target};
@@ -31,7 +31,8 @@ fn frames() -> Vec<Vec<u8>> {
     let target = Target::new("board", BoardSpec::deltille(5, 6, 30.0)).unwrap();
     let scene = scene_of_target(&target).unwrap();
     let [width, height] = SIZE.map(|side| side as u32);
-    let camera = Camera::centred(width, height, FOCAL_PX, Lens::default());
+    let camera =
+        Camera::centred(width, height, FOCAL_PX, Lens::BrownConrady(BrownConrady::default()));
     let middle = target.panels[0].middle_mm();
     let frame = |index: usize| {
         // Between poses, the board is half-way.

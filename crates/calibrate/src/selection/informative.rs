@@ -139,12 +139,13 @@ mod tests {
     use crate::input::observation::{Observation, Sighting};
     use crate::input::panel::PanelRef;
     use crate::input::reference::Reference;
-    use deltille_core::camera::{Camera, Lens, Pose};
+    use deltille_core::camera::{BrownConrady, Camera, Lens, Pose};
     use deltille_core::targets::{BoardSpec, Target};
 
     /// A view of a board that is tilted about the horizontal axis and moved, with noise of 0.05 px.
     fn view(target: &Target, index: usize, tilt: f64, random: &mut impl Rng) -> View {
-        let camera = Camera::centred(1280, 960, 1100.0, Lens::default());
+        let camera =
+            Camera::centred(1280, 960, 1100.0, Lens::BrownConrady(BrownConrady::default()));
         let turn = std::f64::consts::PI + tilt * if index.is_multiple_of(4) { 1.0 } else { -1.0 };
         let rotation = DQuat::from_rotation_z(0.8 * index as f64) * DQuat::from_rotation_x(turn);
         let aside = 40.0 * DVec2::from_angle(2.4 * index as f64);
