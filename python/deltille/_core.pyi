@@ -775,6 +775,8 @@ def frames(
     *,
     topic: str | None = None,
     every: int = 1,
+    start: int = 0,
+    stop: int | None = None,
     max_pixels: int = 150_000_000,
     accept_damaged: bool = False,
 ) -> Frames: ...

@@ -1,7 +1,8 @@
 """Detection in large sets of images on a Ray cluster (``pip install 'deltille[ray]'``).
 
 :func:`detect` makes a dataset with a row for each corner or for each image. :func:`detect_to` writes both as Parquet tables
-into a folder or bucket, and skips images that already have results; ``deltille calibrate`` reads the folder.
+into a folder or bucket, and skips images that already have results; ``deltille calibrate`` reads the folder. Both read
+photographs, and the frames of videos and recordings, which are divided into ranges of frames.
 
 Only paths or encoded files are sent to the workers, and the workers return small tables. Decoded images stay in the worker
 process, which uses one thread. Ray handles lost processes and machines.
@@ -22,6 +23,7 @@ import ray
 import ray.data
 
 import deltille
+from deltille import _recordings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -109,8 +111,8 @@ class Summary:
     images, corners, errors : int
         Number of images processed, of corners found in them, and of images that could not be read.
     skipped : int
-        Number of images that already had results. Images of a dataset are not counted, because the length of a dataset is
-        not known.
+        Number of photographs that already had results. Images of a dataset and frames of recordings are not counted,
+        because their number is not known.
     """
 
     def __init__(self, images: int, corners: int, errors: int, skipped: int) -> None:
@@ -135,6 +137,8 @@ def detect(
     batch_size: int = 64,
     filesystem: Any = None,
     accept_damaged: bool = False,
+    topic: Optional[str] = None,
+    every: int = 1,
     **options: Any,
 ) -> "ray.data.Dataset":
     """Detects a target in images, on all machines of a cluster.
@@ -143,8 +147,9 @@ def detect(
     ----------
     images : str, path-like, sequence of these, or ray.data.Dataset
         Photographs and folders of them, on any filesystem that Ray supports (``"s3://bucket/day"``) and every worker can
-        access. Or a dataset with a column ``path``, and optionally ``bytes`` (encoded files, as from
-        :func:`ray.data.read_binary_files` with ``include_paths=True``).
+        access. Videos and recordings (:func:`deltille.frames`), on a disk that every worker mounts; each is divided
+        into ranges of frames so that all processes have work. Or a dataset with a column ``path``, and optionally
+        ``bytes`` (encoded files, as from :func:`ray.data.read_binary_files` with ``include_paths=True``).
     target : Target or sequence of Target, optional
         The target to find.
     per : str, optional
@@ -160,6 +165,10 @@ def detect(
         Filesystem of the paths; by default derived from them.
     accept_damaged : bool, optional
         Accept truncated JPEG files.
+    topic : str, optional
+        Topic of the images in recordings; needed if several contain images.
+    every : int, optional
+        Read only every N-th frame of videos and recordings.
     **options
         Options of :class:`deltille.Detector`, such as ``grid``, ``rows``, ``cols`` or ``ink``. Images are processed
         independently, without a combined ink estimate; pass a known ink spread as ``ink``, in µm.
@@ -179,7 +188,8 @@ def detect(
     if per not in ("corner", "image", "both"):
         raise ValueError(f'unknown per {per} (known: "corner", "image", "both")')
     found: ray.data.Dataset
-    found, _ = _detect(images, frozenset(), target, per, concurrency, batch_size, filesystem, accept_damaged, options)
+    reading = _Reading(filesystem, accept_damaged, topic, every)
+    found, _ = _detect(images, frozenset(), target, per, concurrency, batch_size, reading, options)
     return found
 
 
@@ -192,6 +202,8 @@ def detect_to(
     batch_size: int = 64,
     filesystem: Any = None,
     accept_damaged: bool = False,
+    topic: Optional[str] = None,
+    every: int = 1,
     images_per_file: int = 1000,
     **options: Any,
 ) -> Summary:
@@ -204,7 +216,7 @@ def detect_to(
     ----------
     folder : str or path-like
         A folder or bucket that every worker can access; created if necessary.
-    images, target, concurrency, batch_size, filesystem, accept_damaged, **options
+    images, target, concurrency, batch_size, filesystem, accept_damaged, topic, every, **options
         See :func:`detect`; `filesystem` is that of the images.
     images_per_file : int, optional
         Minimum number of images per file of either table. An interrupted run loses images that are not in a file yet.
@@ -221,7 +233,8 @@ def detect_to(
     if images_per_file < 1:
         raise ValueError("images_per_file must be at least 1")
     to, root = _place(folder)
-    asked = _asked(target, {**options, "accept_damaged": accept_damaged})
+    of_topic = {} if topic is None else {"topic": topic}
+    asked = _asked(target, {**options, **of_topic, "accept_damaged": accept_damaged})
     for path in _files(to, f"{root}/images")[:1]:
         with to.open_input_file(path) as file:
             known = (pq.read_schema(file).metadata or {}).get(ASKED, asked)
@@ -230,9 +243,8 @@ def detect_to(
             raise deltille.DetectionError(f"{folder}: {what}")
     _remove_halves(to, root)
     there = done(folder)
-    dataset, skipped = _detect(
-        images, there, target, "both", concurrency, batch_size, filesystem, accept_damaged, options
-    )
+    reading = _Reading(filesystem, accept_damaged, topic, every)
+    dataset, skipped = _detect(images, there, target, "both", concurrency, batch_size, reading, options)
     if dataset is None:
         return Summary(0, 0, 0, skipped)
     # A single process writes all files, because Ray needs a second to start a process. It reserves no processor: the
@@ -301,8 +313,7 @@ def _detect(
     per: str,
     concurrency: Any,
     batch_size: int,
-    filesystem: Any,
-    accept_damaged: bool,
+    reading: "_Reading",
     options: dict[str, Any],
 ) -> tuple[Any, int]:
     """Returns the dataset, or ``None`` if nothing is left to do, and the number of skipped images."""
@@ -311,31 +322,35 @@ def _detect(
     # Report wrong options here, not in every worker.
     deltille.Detector(target, **options)
     skipped = 0
-    if filesystem is not None and not isinstance(filesystem, pafs.FileSystem):
-        filesystem = pafs.PyFileSystem(pafs.FSSpecHandler(filesystem))
+    if not ray.is_initialized():
+        ray.init()
+    resources: Callable[[], dict[str, float]] = ray.cluster_resources
+    processors = max(1, int(resources().get("CPU", 1)))
     if isinstance(images, ray.data.Dataset):
         names = set(images.schema().names)
         if "path" not in names:
             raise ValueError("images: the dataset has no column path with the names of the images")
-        dataset = images
+        dataset, rows = images, batch_size
     else:
-        paths = _listed(images, filesystem)
+        paths, recordings = _listed(images, reading.filesystem)
         left = [path for path in paths if path not in there]
         skipped = len(paths) - len(left)
-        if not left and per == "both":
+        most = processors if concurrency is None else concurrency if isinstance(concurrency, int) else concurrency[1]
+        recordings = [path for path in recordings if path not in there]
+        ranges = _recordings.ranges(recordings, most, reading.every, reading.topic, batch_size)
+        if not left and not ranges and per == "both":
             return None, skipped
-        blocks = [left[at : at + batch_size] for at in range(0, len(left), batch_size)] or [[]]
-        dataset = ray.data.from_arrow([pa.table({"path": pa.array(block, pa.string())}) for block in blocks])
-        there = frozenset()
+        work = [left[at : at + batch_size] for at in range(0, len(left), batch_size)]
+        tables = [_work(paths) for paths in work] + [_work([], one) for one in ranges]
+        dataset, rows = ray.data.from_arrow(tables or [_work([])]), 1
+        there = there if ranges else frozenset()
     if concurrency is None:
-        resources: Callable[[], dict[str, float]] = ray.cluster_resources
-        processors = max(1, int(resources().get("CPU", 1)))
         # The stages that make a dataset need a processor, too, and would wait for it forever.
         concurrency = processors if images is not dataset else (1, max(1, processors - 1))
     least, most = concurrency if isinstance(concurrency, tuple) else (concurrency, concurrency)
     found = dataset.map_batches(
         _Looking,
-        batch_size=batch_size,
+        batch_size=rows,
         batch_format="pyarrow",
         compute=ray.data.ActorPoolStrategy(min_size=least, max_size=most),
         num_cpus=1,
@@ -343,24 +358,55 @@ def _detect(
             "target": target,
             "options": options,
             "per": per,
-            "filesystem": filesystem,
-            "accept_damaged": accept_damaged,
+            "reading": reading,
+            "images_per_table": batch_size,
             "there": there,
         },
     )
     return found, skipped
 
 
-def _listed(paths: Paths, filesystem: Any) -> list[str]:
-    """Lists the images among paths and in folders, sorted by name within a folder."""
+class _Reading:
+    """How images are read."""
+
+    def __init__(self, filesystem: Any, accept_damaged: bool, topic: Optional[str], every: int) -> None:
+        if every < 1:
+            raise ValueError("every must be at least 1")
+        if filesystem is not None and not isinstance(filesystem, pafs.FileSystem):
+            filesystem = pafs.PyFileSystem(pafs.FSSpecHandler(filesystem))
+        self.filesystem = filesystem
+        self.accept_damaged = accept_damaged
+        self.topic = topic
+        self.every = every
+
+
+def _work(paths: list[str], of: Optional[_recordings.Range] = None) -> pa.Table:
+    """Makes the row of a task: photographs, or a range of a recording."""
+    return pa.table(
+        {
+            "photographs": pa.array([paths], pa.list_(pa.string())),
+            "recording": pa.array([of and of.path], pa.string()),
+            "start": pa.array([of and of.start], pa.int64()),
+            "stop": pa.array([of and of.stop], pa.int64()),
+        }
+    )
+
+
+def _listed(paths: Paths, filesystem: Any) -> tuple[list[str], list[str]]:
+    """Lists the photographs among paths and in folders, sorted by name within a folder, and the recordings among paths."""
     listed: list[str] = []
+    recordings: list[str] = []
     for path in [paths] if isinstance(paths, (str, os.PathLike)) else paths:
         text = os.fspath(path)
         on, inside = (filesystem, text) if filesystem is not None else _place(text)
         info = on.get_file_info(inside)
         if info.type == pafs.FileType.NotFound:
             raise FileNotFoundError(f"{text}: no such file or folder")
-        if info.type != pafs.FileType.Directory:
+        is_folder = info.type == pafs.FileType.Directory
+        if _recordings.is_recording(text, on, inside, is_folder):
+            recordings.append(_recordings.local(text, on, inside))
+            continue
+        if not is_folder:
             listed.append(text)
             continue
         found = on.get_file_info(pafs.FileSelector(inside, recursive=True))
@@ -370,7 +416,7 @@ def _listed(paths: Paths, filesystem: Any) -> list[str]:
             if file.is_file and file.path.lower().endswith(_ENDINGS) and not file.path.endswith(".overlay.jpg")
         )
         listed.extend(f"{text.rstrip('/')}/{name}" for name in inner)
-    return list(dict.fromkeys(listed))
+    return list(dict.fromkeys(listed)), list(dict.fromkeys(recordings))
 
 
 class _Looking:
@@ -381,19 +427,44 @@ class _Looking:
         target: Optional[Targets],
         options: dict[str, Any],
         per: str,
-        filesystem: Any,
-        accept_damaged: bool,
+        reading: _Reading,
+        images_per_table: int,
         there: frozenset[str],
     ) -> None:
         # Ray runs one process per processor.
         os.environ["RAYON_NUM_THREADS"] = "1"
         self.detector = deltille.Detector(target, **options)
         self.per = per
-        self.filesystem = filesystem
-        self.accept_damaged = accept_damaged
+        self.reading = reading
+        self.images_per_table = images_per_table
         self.there = there
 
     def __call__(self, batch: pa.Table) -> Iterator[pa.Table]:
+        if "photographs" not in batch.column_names:
+            yield self._photographs(batch)
+            return
+        (work,) = batch.to_pylist()
+        if work["recording"] is None:
+            yield self._photographs(pa.table({"path": pa.array(work["photographs"], pa.string())}))
+        else:
+            yield from self._frames(_recordings.Range(work["recording"], work["start"], work["stop"]))
+
+    def _frames(self, of: _recordings.Range) -> Iterator[pa.Table]:
+        """Detects targets in a range of a recording; yields tables so that little is lost if the run is interrupted."""
+        rows = _Rows()
+        try:
+            reading = self.reading
+            for name, frame in _recordings.frames(of, reading.topic, reading.every, reading.accept_damaged):
+                if name not in self.there:
+                    self._add(rows, name, lambda: self.detector.detect(frame, name=name))
+                if len(rows.images) == self.images_per_table:
+                    yield rows.table(self.per)
+                    rows = _Rows()
+        except (deltille.Error, OSError, ValueError) as error:
+            rows.failed(of.path, f"{error}")
+        yield rows.table(self.per)
+
+    def _photographs(self, batch: pa.Table) -> pa.Table:
         rows = _Rows()
         names = batch.column_names
         content = batch["bytes"] if "bytes" in names else [None] * len(batch)
@@ -402,17 +473,24 @@ class _Looking:
             name = path.as_py()
             if name in self.there:
                 continue
-            try:
-                data = self._read(name) if encoded is None else encoded.as_buffer()
-                found = self.detector.detect_bytes(data, name=name, accept_damaged=self.accept_damaged)
-            except (deltille.Error, OSError, ValueError) as error:
-                rows.failed(name, f"{error}")
-            else:
-                rows.add(name, found)
-        yield rows.table(self.per)
+            self._add(rows, name, lambda: self._detected(name, encoded))
+        return rows.table(self.per)
+
+    def _detected(self, name: str, encoded: Any) -> "deltille.Detection":
+        data = self._read(name) if encoded is None else encoded.as_buffer()
+        return self.detector.detect_bytes(data, name=name, accept_damaged=self.reading.accept_damaged)
+
+    def _add(self, rows: "_Rows", name: str, detect: Callable[[], "deltille.Detection"]) -> None:
+        try:
+            found = detect()
+        except (deltille.Error, OSError, ValueError) as error:
+            rows.failed(name, f"{error}")
+        else:
+            rows.add(name, found)
 
     def _read(self, path: str) -> Any:
-        on, inside = (self.filesystem, path) if self.filesystem is not None else _place(path)
+        filesystem = self.reading.filesystem
+        on, inside = (filesystem, path) if filesystem is not None else _place(path)
         with on.open_input_stream(inside) as file:
             return file.read()
 

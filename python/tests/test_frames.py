@@ -23,6 +23,9 @@ def test_frames_have_names_times_and_images(file, topic):
         assert [frame.time for frame in found] == [time / 1e9 for time in TIMES_NS]
         assert all(frame.image.shape == (120, 160) and frame.image.dtype == np.uint8 for frame in found)
     assert [frame.name for frame in deltille.frames(RECORDINGS / file, topic=topic, every=2)] == ["run-000000"]
+    for start, stop, numbers in [(0, 1, [0]), (1, None, [1]), (1, 9, [1]), (0, 0, []), (5, None, [])]:
+        part = deltille.frames(RECORDINGS / file, topic=topic, start=start, stop=stop)
+        assert [frame.name for frame in part] == [f"run-{number:06}" for number in numbers]
 
 
 def test_frames_are_detected_like_arrays():
@@ -44,6 +47,8 @@ def test_problems_are_exceptions_or_warnings(tmp_path):
         iter(deltille.frames(tmp_path / "absent.mcap"))
     with pytest.raises(deltille.ArgumentError):
         deltille.frames(tmp_path, every=0)
+    with pytest.raises(deltille.ArgumentError):
+        deltille.frames(tmp_path, start=-1)
     whole = (RECORDINGS / "run.mcap").read_bytes()
     (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) * 6 // 10])
     with pytest.warns(UserWarning, match="incomplete after 1 frame"):

@@ -139,6 +139,57 @@ def test_filesystems(shots, target):
     assert {row["corners"] for row in uri} == {row["corners"] for row in pictures}
 
 
+@pytest.fixture(scope="module")
+def video(tmp_path_factory, target) -> Path:
+    """A video of seven frames, uncompressed."""
+    camera = deltille.Camera(480, 360, 450.0)
+    middle = target.corners.mean(axis=0)
+    eyes = [middle + [10.0 * index - 30.0, -60.0, 280.0] for index in range(7)]
+    shots = [deltille.render(target, camera, eye=eye, seed=index)[0] for index, eye in enumerate(eyes)]
+    path = tmp_path_factory.mktemp("video") / "run.y4m"
+    path.write_bytes(b"YUV4MPEG2 W480 H360 F30:1 Cmono\n" + b"".join(b"FRAME\n" + shot.tobytes() for shot in shots))
+    return path
+
+
+def test_a_recording_is_divided_among_processes(video, shots, target):
+    detector = deltille.Detector(target)
+    due = {}
+    for frame in deltille.frames(video):
+        found = detector.detect(frame)
+        for number, pixel, cov in zip(found.ids, found.pixels, found.covariances):
+            due[f"{video.parent / frame.name}", int(number)] = (pixel[0], pixel[1], cov[0, 0])
+    for batch_size in (1, 3, 64):
+        assert places(deltille.ray.detect(video, target, batch_size=batch_size).take_all()) == due
+    assert places(deltille.ray.detect([video, shots], target, batch_size=2).take_all()) == due | expected(shots, target)
+    third = deltille.ray.detect(video, target, per="image", every=3, batch_size=1).take_all()
+    assert {Path(row["image"]).name: row["time_ns"] for row in third} == {
+        frame.name: frame.time_ns for frame in deltille.frames(video, every=3)
+    }
+
+
+def test_frames_with_results_are_skipped(video, target, tmp_path):
+    first = deltille.ray.detect_to(tmp_path / "found", video, target, every=2)
+    assert (first.images, first.errors) == (4, 0)
+    assert deltille.ray.detect_to(tmp_path / "found", video, target).images == 3
+    assert deltille.ray.detect_to(tmp_path / "found", video, target).images == 0
+    images = pq.read_table(tmp_path / "found/images")["image"].to_pylist()
+    assert sorted(images) == [f"{video.parent / 'run'}-{number:06}" for number in range(7)]
+
+
+def test_recordings_that_cannot_be_read_have_errors(video, root, target, tmp_path):
+    bag = root / "tests/recordings/run.mcap"
+    (row,) = deltille.ray.detect(bag, target, per="image").take_all()
+    assert row["image"] == f"{bag}" and "choose one with topic" in row["error"]
+    rows = deltille.ray.detect(bag, target, per="image", topic="/camera/image").take_all()
+    assert sorted(Path(row["image"]).name for row in rows) == ["run-000000", "run-000001"]
+    cut = tmp_path / "cut.y4m"
+    cut.write_bytes(video.read_bytes()[:-1000])
+    with pytest.warns(UserWarning, match="incomplete after 6 frames"):
+        assert deltille.ray.detect(cut, target, per="image").count() == 6
+    with pytest.raises(ValueError, match="every"):
+        deltille.ray.detect(video, target, every=0)
+
+
 def test_errors_are_reported_before_work_starts(shots, target, tmp_path):
     with pytest.raises(FileNotFoundError, match="nowhere"):
         deltille.ray.detect(shots / "nowhere", target)

@@ -19,6 +19,10 @@ pub struct FrameOptions {
     pub topic: Option<String>,
     /// Number of frames of a recording of which the first is read; 0 and 1 for all.
     pub every: u64,
+    /// Number of the first frame of a recording that is read.
+    pub start: u64,
+    /// Number of the frame of a recording before which reading stops; `None` for all.
+    pub stop: Option<u64>,
     /// Limits of each image, and of each part of a recording.
     pub limits: Limits,
 }
@@ -55,6 +59,8 @@ struct Recording {
     /// Number of frames so far.
     count: u64,
     every: u64,
+    start: u64,
+    stop: Option<u64>,
 }
 
 impl Frames {
@@ -69,9 +75,9 @@ impl Frames {
         if folder::is_recording(path) {
             let duration = Duration::default();
             let stream = Some(open(path, options, &duration).map_err(failed)?);
-            let every = options.every.max(1);
-            let path = path.to_owned();
-            let recording = Recording { path, stream, duration, count: 0, every };
+            let &FrameOptions { every, start, stop, .. } = options;
+            let (path, every) = (path.to_owned(), every.max(1));
+            let recording = Recording { path, stream, duration, count: 0, every, start, stop };
             return Ok(Self(Kind::Recording(recording)));
         }
         if !path.is_dir() {
@@ -99,12 +105,15 @@ impl Iterator for Frames {
 impl Recording {
     fn next(&mut self) -> Option<Result<Frame, FramesError>> {
         loop {
-            let next = self.stream.as_mut()?.next();
             let number = self.count;
+            if self.stop.is_some_and(|stop| number >= stop) {
+                self.stream = None;
+            }
+            let next = self.stream.as_mut()?.next();
             match next {
                 Some(Ok((time_ns, content))) => {
                     self.count += 1;
-                    if number.is_multiple_of(self.every) {
+                    if number >= self.start && number.is_multiple_of(self.every) {
                         let frame = Frame::new(self.path_of(number), time_ns, content);
                         let duration = self.duration.load(Ordering::Relaxed);
                         return Some(Ok(frame.of_recording(duration)));

@@ -34,6 +34,9 @@ pub struct Frames {
 ///     Topic of the images; needed if several topics of a recording contain images.
 /// every : int, optional
 ///     Read only every N-th frame of a video or recording.
+/// start, stop : int, optional
+///     Read only the frames of a video or recording from number `start` up to, but without, `stop`. Earlier frames are
+///     skipped without being decoded, except by ffmpeg.
 /// max_pixels : int, optional
 ///     Maximum number of pixels of an image.
 /// accept_damaged : bool, optional
@@ -47,7 +50,7 @@ pub struct Frames {
 /// Raises
 /// ------
 /// ArgumentError
-///     If ``every`` or ``max_pixels`` is less than 1.
+///     If ``every`` or ``max_pixels`` is less than 1, or ``start`` or ``stop`` is negative.
 ///
 /// Examples
 /// --------
@@ -57,17 +60,23 @@ pub struct Frames {
 /// >>> for frame in frames:  # doctest: +SKIP
 /// ...     print(frame.name, frame.time, len(tracker.detect(frame)))
 #[pyfunction(name = "frames")]
-#[pyo3(signature = (path, *, topic = None, every = 1, max_pixels = 150_000_000, accept_damaged = false))]
+#[pyo3(signature = (
+    path, *, topic = None, every = 1, start = 0, stop = None, max_pixels = 150_000_000, accept_damaged = false
+))]
 pub fn frames_of(
     path: PathBuf,
     topic: Option<String>,
     every: i64,
+    start: i64,
+    stop: Option<i64>,
     max_pixels: i64,
     accept_damaged: bool,
 ) -> PyResult<Frames> {
     let mut options = FrameOptions::default();
     options.topic = topic;
     options.every = whole("every", every, errors::argument)?;
+    options.start = whole("start", start, errors::argument)?;
+    options.stop = stop.map(|stop| whole("stop", stop, errors::argument)).transpose()?;
     options.limits.max_pixels = whole("max_pixels", max_pixels, errors::argument)?;
     if options.every == 0 {
         return Err(raised::ArgumentError::new_err("every must be at least 1"));
