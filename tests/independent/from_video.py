@@ -6,7 +6,7 @@
 The page passes through numpy and OpenCV only: the rays of every pixel from the inverse of the distortion, four samples a
 pixel, several instants of the exposure, blur, noise, H.264 (`-crf 16`, yuv420p). The camera moves between poses with
 tilts of up to 50° and rests for a third of a second at each, with the tremor of a hand. `check` calibrates with one command, and
-compares the focal length with that of 60 random frames and of all frames, and the errors with their standard deviations.
+compares the focal length with that of as many random frames and of all frames, and the errors with their standard deviations.
 """
 
 import json

@@ -23,6 +23,7 @@ const INTERRUPT: u8 = 2;
 static FLAG: AtomicBool = AtomicBool::new(false);
 static SIGNAL: AtomicU8 = AtomicU8::new(INTERRUPT);
 static KEEPS: AtomicBool = AtomicBool::new(false);
+static FINISHES: AtomicBool = AtomicBool::new(false);
 static STATUS: Mutex<Cow<'static, str>> = Mutex::new(Cow::Borrowed("the work was not finished"));
 
 /// Returns the flag that becomes true with the first signal.
@@ -30,9 +31,14 @@ pub fn flag() -> &'static AtomicBool {
     &FLAG
 }
 
-/// Whether a signal has arrived.
+/// Whether a signal has arrived that ends the work.
 pub fn is_raised() -> bool {
-    FLAG.load(Ordering::Relaxed)
+    FLAG.load(Ordering::Relaxed) && !FINISHES.load(Ordering::Relaxed)
+}
+
+/// Whether a signal has ended the input, see [`end_input`].
+pub fn has_ended_input() -> bool {
+    FLAG.load(Ordering::Relaxed) && FINISHES.load(Ordering::Relaxed)
 }
 
 /// Returns the exit code for the signal that arrived.
@@ -44,6 +50,16 @@ pub fn exit_code() -> u8 {
 /// aborts it.
 pub fn keeps_results() {
     KEEPS.store(true, Ordering::Relaxed);
+}
+
+/// Declares the end of the input. If a signal has arrived, the work continues with the input so far, and a second signal aborts
+/// it; otherwise the first one does.
+pub fn end_input() {
+    if is_raised() {
+        FINISHES.store(true, Ordering::Relaxed);
+    } else {
+        KEEPS.store(false, Ordering::Relaxed);
+    }
 }
 
 /// Sets the status that is printed if the work is aborted from now on.

@@ -83,8 +83,8 @@ impl FilmArgs {
         };
         let most = self.views.unwrap_or(if recordings > 0 { VIEWS } else { u32::MAX }) as usize;
         let mut detections = selected(&keyframes, reference, intrinsics, most)?;
-        if let Some(detector) = film.detector.with_ink_of(&inks).filter(|_| !interrupt::is_raised())
-        {
+        let again = film.detector.with_ink_of(&inks);
+        if let Some(detector) = again.filter(|_| !interrupt::has_ended_input()) {
             film.see_again(&detector, &mut detections)?;
         }
         let files = detections.iter().map(|(name, _)| PathBuf::from(name)).collect();
@@ -232,7 +232,7 @@ impl Film<'_> {
             let Ok(frame) = frame else { continue };
             let Some(found) = wanted.remove(&frame.stem()) else { continue };
             *found = self.one(frame, |image, name| detector.detect(image, name))?.1;
-            if wanted.is_empty() || interrupt::is_raised() {
+            if wanted.is_empty() {
                 break;
             }
         }
@@ -248,9 +248,10 @@ fn ended(
 ) -> anyhow::Result<Seen> {
     let frames = counted(inks.len(), "frame");
     if interrupt::is_raised() {
-        ensure!(!keyframes.is_empty(), Interrupted(format!("no target in {frames}")));
+        ensure!(!keyframes.is_empty(), Interrupted(format!("no board found in {frames}")));
         log!("note: interrupted after {frames}; calibrating with these");
     }
+    interrupt::end_input();
     ensure!(!keyframes.is_empty() || !errors.is_empty(), "no board of this kind found in {frames}");
     let last = errors.pop();
     errors.iter().for_each(report);

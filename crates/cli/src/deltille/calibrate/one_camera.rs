@@ -147,7 +147,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let _ = writeln!(text, "wrote {}", shown(&path.display().to_string()));
     }
     output::print(&text)?;
-    if interrupt::is_raised() {
+    if interrupt::has_ended_input() {
         return Ok(ExitCode::from(interrupt::exit_code()));
     }
     Ok(formats_left_out(&refused).unwrap_or(solved.exit_code()))
