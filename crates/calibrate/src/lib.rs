@@ -13,6 +13,8 @@
 //! 7. `estimate` assembles the result from all of these.
 //! 8. `diagnose` reports the problems of an estimate, their causes and remedies.
 //!
+//! 9. `check` tests whether a calibrated camera still agrees with a few new views.
+//!
 //! `adjusted` runs 4 to 7 on all views. `solve` wraps it and holds out frames; `automatic` selects
 //! a model with `solve`; `located` computes the pose of a target. `compare` and `next_view` read
 //! estimates; `selection` selects frames of a recording by the gain of `next_view`. Every module may import `model` (lens models), `matrix` (in results), `error`
@@ -37,6 +39,7 @@ mod adjust;
 mod adjusted;
 mod automatic;
 mod cancel;
+mod check;
 mod compare;
 mod diagnose;
 mod equations;
@@ -57,6 +60,7 @@ mod uncertainty;
 pub use adjust::finding::{Finding, Moved, OutlierPattern};
 pub use adjust::lack_of_fit::LackOfFit;
 pub use automatic::Candidate;
+pub use check::answer::{Answer, Check, Missing, Quantity, QuantityTest, Remedial};
 pub use compare::comparison::{
     CameraMotion, Comparison, ComparisonError, Difference, Region, compare_boards,
 };

@@ -77,7 +77,7 @@ pub(crate) struct Settled {
 ///
 /// # Errors
 /// Returns an error if the normal equations cannot be formed or solved from the initial values.
-pub(super) fn settle(
+pub(crate) fn settle(
     kept: Kept,
     weights: Weights,
     loss: Loss,

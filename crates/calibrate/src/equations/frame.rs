@@ -91,6 +91,38 @@ impl OfFrame {
         product
     }
 
+    /// Adds the matrix of all unknowns.
+    pub(crate) fn add_to(&self, whole: &mut DMatrix<f64>) {
+        let mut with_pose = DMatrix::zeros(whole.nrows(), 6);
+        self.with_pose(|unknown, across| {
+            let mut row = with_pose.row_mut(unknown);
+            row += across.transpose();
+        });
+        for local in &self.locals {
+            for (i, &row) in local.columns.iter().enumerate() {
+                for (&column, value) in local.columns.iter().zip(local.row(i)) {
+                    whole[(row, column)] += value;
+                    if column != row {
+                        whole[(column, row)] += value;
+                    }
+                }
+            }
+            for (corner, cross) in local.corners() {
+                let first = self.shared + 3 * corner.index;
+                let mut own = whole.fixed_view_mut::<3, 3>(first, first);
+                own += corner.own;
+                for (&column, values) in local.columns.iter().zip(cross) {
+                    for (k, value) in values.iter().enumerate() {
+                        whole[(first + k, column)] += value;
+                        whole[(column, first + k)] += value;
+                    }
+                }
+            }
+        }
+        let solved = self.pose.solve(&with_pose.transpose());
+        whole.gemm(-1.0, &with_pose, &solved, 1.0);
+    }
+
     /// Adds the coupling between the shared unknowns (rows) and the offsets of all corners (columns).
     pub(crate) fn add_across(&self, across: &mut DMatrix<f64>) {
         for local in &self.locals {

@@ -97,6 +97,11 @@ impl Normal {
                 normal.cost +=
                     roughness.add(&camera.camera, parameters, whitening.sigma, matrix, right);
             }
+            if let Some(prior) = &camera.prior {
+                let (matrix, right) = (&mut normal.a, &mut normal.right);
+                normal.cost +=
+                    prior.add(&camera.camera, parameters, whitening.sigma, matrix, right);
+            }
         }
         normal.cost.is_finite().then_some(normal)
     }

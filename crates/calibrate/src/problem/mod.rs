@@ -11,6 +11,7 @@
 //! 5. `corner_gauge` removes from the offsets the directions that poses absorb.
 
 pub(crate) mod bundle;
+pub(crate) mod camera_prior;
 pub(crate) mod corner_gauge;
 pub(crate) mod corner_map;
 pub(crate) mod panels;

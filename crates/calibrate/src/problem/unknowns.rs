@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix6, Vector6};
 
+use super::camera_prior::CameraPrior;
 use super::roughness::Roughness;
 use crate::input::observation::Observation;
 use crate::input::panel::PanelRef;
@@ -23,6 +24,8 @@ pub(crate) struct CameraUnknowns {
     pub pose_free: bool,
     /// The prior of the knots of a spline.
     pub roughness: Option<Roughness>,
+    /// The prior of its parameters, from an earlier calibration.
+    pub prior: Option<CameraPrior>,
 }
 
 /// A target, whose panels move together.
@@ -94,7 +97,8 @@ impl CameraUnknowns {
     pub(crate) fn alone(camera: Camera, free: Vec<bool>) -> Self {
         let free = without_gauge(&camera.lens, free);
         let roughness = Roughness::of(&camera, &free);
-        Self { camera, free, camera_from_rig: Pose::IDENTITY, pose_free: false, roughness }
+        let camera_from_rig = Pose::IDENTITY;
+        Self { camera, free, camera_from_rig, pose_free: false, roughness, prior: None }
     }
 
     /// Removes the prior of its knots.

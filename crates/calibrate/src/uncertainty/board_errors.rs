@@ -78,7 +78,7 @@ pub(crate) fn board_errors(
 }
 
 /// Standard deviation of a corner per axis, mm; `None` for an exact board.
-fn accuracy(map: &CornerMap, given_mm: Option<f64>) -> Option<f64> {
+pub(crate) fn accuracy(map: &CornerMap, given_mm: Option<f64>) -> Option<f64> {
     let printed = || PRINTED_MM.min(PRINTED_EDGES * map.edge_mm());
     Some(given_mm.unwrap_or_else(printed)).filter(|mm| *mm > 0.0)
 }
@@ -132,7 +132,7 @@ pub(crate) fn drawn_to_plan(
 
 /// Displacements of a sheet as a function of the position relative to its centre: scaled,
 /// stretched, sheared, and bent.
-const SHEET: [fn(DVec3) -> DVec3; 6] = [
+pub(crate) const SHEET: [fn(DVec3) -> DVec3; 6] = [
     |at| DVec3::new(at.x, at.y, 0.0),
     |at| DVec3::new(at.x, -at.y, 0.0),
     |at| DVec3::new(at.y, at.x, 0.0),
@@ -144,7 +144,7 @@ const SHEET: [fn(DVec3) -> DVec3; 6] = [
 /// Offsets of all corners, one column for each mode in which the sheet of a panel differs from its
 /// plan. The modes in the plane together have a mean square of 1 per axis; so do those out of the
 /// plane.
-fn sheets(map: &CornerMap, fields: &[fn(DVec3) -> DVec3]) -> DMatrix<f64> {
+pub(crate) fn sheets(map: &CornerMap, fields: &[fn(DVec3) -> DVec3]) -> DMatrix<f64> {
     let mut columns = Vec::new();
     let mut first = 0;
     // Corners are ordered by panel.

@@ -1,0 +1,68 @@
+//! The prior of the parameters of a camera: their values and covariance in an earlier calibration.
+
+use nalgebra::{DMatrix, DVector};
+
+use deltille_core::camera::Camera;
+
+/// A ridge on correlations, because files round them.
+const RIDGE: f64 = 1e-9;
+
+/// Earlier values of the parameters of a camera.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct CameraPrior {
+    /// All parameters.
+    values: Vec<f64>,
+    /// Inverse covariance of the estimated ones, in their order.
+    information: DMatrix<f64>,
+}
+
+impl CameraPrior {
+    /// Creates the prior; `None` if the covariance has no inverse.
+    pub(crate) fn new(camera: &Camera, covariance: &DMatrix<f64>) -> Option<Self> {
+        Some(Self { values: camera.parameters(), information: inverted(covariance)? })
+    }
+
+    /// The inverse covariance.
+    pub(crate) fn information(&self) -> &DMatrix<f64> {
+        &self.information
+    }
+
+    /// The deviation of a camera from the earlier values; `free` are the indices of the estimated parameters.
+    pub(crate) fn off(&self, camera: &Camera, free: &[usize]) -> DVector<f64> {
+        let now = camera.parameters();
+        DVector::from_iterator(free.len(), free.iter().map(|&i| now[i] - self.values[i]))
+    }
+
+    /// Adds the prior to normal equations whose unit of cost is a residual of `sigma`; returns its cost. `parameters`
+    /// lists the index of each unknown parameter of the camera and its column.
+    pub(crate) fn add(
+        &self,
+        camera: &Camera,
+        parameters: &[(usize, usize)],
+        sigma: f64,
+        matrix: &mut DMatrix<f64>,
+        right: &mut DVector<f64>,
+    ) -> f64 {
+        let free: Vec<usize> = parameters.iter().map(|(index, _)| *index).collect();
+        let off = self.off(camera, &free);
+        let pull = &self.information * &off * (sigma * sigma);
+        for (i, &(_, row)) in parameters.iter().enumerate() {
+            right[row] -= pull[i];
+            for (j, &(_, column)) in parameters.iter().enumerate() {
+                matrix[(row, column)] += self.information[(i, j)] * (sigma * sigma);
+            }
+        }
+        off.dot(&pull)
+    }
+}
+
+/// The inverse of a covariance of parameters with different units.
+fn inverted(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = covariance.nrows();
+    let scale = DVector::from_fn(n, |i, _| covariance[(i, i)].sqrt().recip());
+    let mut scaled = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] * scale[i] * scale[j]);
+    (0..n).for_each(|i| scaled[(i, i)] += RIDGE);
+    let inverse = scaled.cholesky()?.inverse();
+    let inverse = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+    inverse.iter().all(|v| v.is_finite()).then_some(inverse)
+}
