@@ -2,10 +2,11 @@
 //!
 //! [`calibration`] and [`rig`] write estimates with the records of `estimate`, `finding` and `motion`. [`saved`] reads them back;
 //! [`sheet`] reads only their data about the print. [`camera`] writes the formats of other programs, and `format` is the table of
-//! these formats. [`comparison`], [`pose`], [`next_view`], [`undistortion`] and [`truth`] are the results of other commands.
+//! these formats. [`check`], [`comparison`], [`pose`], [`next_view`], [`undistortion`] and [`truth`] are the results of other commands.
 
 pub mod calibration;
 pub mod camera;
+pub mod check;
 pub mod comparison;
 pub(super) mod estimate;
 pub(super) mod finding;
