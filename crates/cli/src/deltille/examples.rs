@@ -81,6 +81,10 @@ pub const COMPARE: &str = "Examples:
   deltille compare monday.json friday.json
   deltille compare before.yaml after.json --tolerance 0.1 -o change.json";
 
+pub const CHECK: &str = "Examples:
+  deltille check camera.json today/*.jpg --target desk/desk.json
+  deltille check camera.json corners --target desk/desk.json -o check.json";
+
 pub const POSE: &str = "Examples:
   deltille pose photos --target desk/desk.json --camera camera.yaml
   deltille pose photo.png --target desk/desk.json --camera camera.yaml --all-images";

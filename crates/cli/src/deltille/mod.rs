@@ -23,7 +23,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use self::apply::{pose, undistort};
+use self::apply::{check, pose, undistort};
 use self::calibrate::{compare, guide, one_camera, rig};
 use self::make::{aprilgrid, board, charuco, circles, plan, solid, verify};
 use self::measure::{bench, experiment};
@@ -120,6 +120,12 @@ enum Command {
     /// uncertainties of a camera are unknown. Use the .json of a calibration, which contains them.
     #[command(after_help = examples::COMPARE)]
     Compare(compare::Args),
+    /// Test whether a camera is still as calibrated, from a few photographs of a target
+    ///
+    /// The answer is `unchanged` (exit code 0), `changed` with what has changed (1), or `cannot tell` with what is
+    /// missing (3). The camera file must contain uncertainties: the .json of `deltille calibrate`.
+    #[command(after_help = examples::CHECK)]
+    Check(check::Args),
     /// Estimate the pose of a target in photographs from a calibrated camera
     #[command(after_help = examples::POSE)]
     Pose(pose::Args),
@@ -146,6 +152,7 @@ pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
     match deltille.command {
         Command::Bench(args) => bench::run(args),
         Command::Calibrate(args) => one_camera::run(args),
+        Command::Check(args) => check::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Guide(args) => guide::run(*args),
         Command::Plan(args) => plan::run(args),

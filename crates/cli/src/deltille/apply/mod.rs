@@ -4,7 +4,9 @@
 //!
 //! 1. `pose`: the pose of a target in each photograph;
 //! 2. `undistort`: photographs undistorted to a pinhole projection, or the remap tables; for two cameras of a rig,
-//!    rectified images (`deltille rectify`).
+//!    rectified images (`deltille rectify`);
+//! 3. `check`: whether the camera is still as calibrated.
 
+pub mod check;
 pub mod pose;
 pub mod undistort;

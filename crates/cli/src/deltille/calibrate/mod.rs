@@ -19,4 +19,4 @@ pub mod one_camera;
 mod report_page;
 pub mod rig;
 pub mod sightings;
-mod solving;
+pub mod solving;

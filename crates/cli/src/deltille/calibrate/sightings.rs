@@ -169,7 +169,7 @@ impl SightingsArgs {
             false => given(&self.inputs, &limits)?,
         };
         let Read { mut views, empty, mut left_out, ink, detections } =
-            given.read(&reference, self.assume_target)?;
+            shown(given.read(&reference, self.assume_target)?)?;
         let board = match reference {
             Reference::Grid(grid) if measure_target => {
                 let made = grid
@@ -297,6 +297,22 @@ pub fn read(
     limits: &Limits,
     is_assumed: bool,
 ) -> anyhow::Result<Read> {
+    shown(read_any(paths, reference, limits, is_assumed)?)
+}
+
+/// Returns an error if no image shows the target.
+fn shown(read: Read) -> anyhow::Result<Read> {
+    ensure!(!read.views.is_empty(), nothing_shown(&read.detections));
+    Ok(read)
+}
+
+/// Like [`read`], but accepts that no image shows the target.
+pub fn read_any(
+    paths: &[PathBuf],
+    reference: &Reference,
+    limits: &Limits,
+    is_assumed: bool,
+) -> anyhow::Result<Read> {
     given(paths, limits)?.read(reference, is_assumed)
 }
 
@@ -380,7 +396,6 @@ impl Given {
         for (index, out) in &left_out {
             log!("warning: excluded: {}: {}", files[*index].display(), out.reason);
         }
-        ensure!(!views.is_empty(), nothing_shown(&detections));
         let empty = empty.into_iter().map(|index| files[index].clone()).collect();
         let left_out = left_out.into_iter().map(|(_, out)| out).collect();
         let ink = ink_of(&detections, reference);
@@ -405,7 +420,7 @@ fn assume(detections: &mut [(String, Detection)], reference: &Reference) {
 }
 
 /// Reports that no image shows the target, with the most frequent reason.
-fn nothing_shown(detections: &[(String, Detection)]) -> String {
+pub fn nothing_shown(detections: &[(String, Detection)]) -> String {
     let mut given = BTreeMap::new();
     for (_, found) in detections {
         let reasons: BTreeMap<_, _> = found.reasons.iter().map(|why| (why.kind, why)).collect();

@@ -328,7 +328,7 @@ pub fn left_out(refused: &[FormatError]) -> Option<ExitCode> {
 }
 
 /// Parses the standard deviation of a board's corners, mm.
-fn accuracy(text: &str) -> Result<f64, String> {
+pub fn accuracy(text: &str) -> Result<f64, String> {
     if text.trim() == "0" {
         return Ok(0.0);
     }
