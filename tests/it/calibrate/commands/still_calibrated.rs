@@ -1,0 +1,91 @@
+//! `deltille check`: the three answers and their exit codes.
+
+use super::{CALIBRATE, board, camera, detections, done, folder, json, output, seen_whole};
+use deltille::camera::{Camera, Pose};
+use deltille::detect::Detection;
+use deltille::export::detection;
+use deltille::targets::Target;
+use glam::{DQuat, DVec3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde_json::Value;
+use std::path::Path;
+
+/// Views of a camera, tilted by these angles to all sides.
+fn views(target: &Target, camera: &Camera, tilts_rad: &[f64], seed: u64) -> Vec<Detection> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let middle = target.panels[0].middle_mm();
+    let pose = |(index, &tilt): (usize, &f64)| {
+        let side = DVec3::new(f64::cos(2.0 * index as f64), f64::sin(2.0 * index as f64), 0.0);
+        let facing = DQuat::from_rotation_x(std::f64::consts::PI);
+        let rotation = DQuat::from_scaled_axis(side * tilt) * facing;
+        let centre = DVec3::new(60.0 * side.x, 40.0 * side.y, 330.0);
+        Pose { rotation, translation: centre - rotation * middle }
+    };
+    let poses: Vec<Pose> = tilts_rad.iter().enumerate().map(pose).collect();
+    poses.iter().map(|pose| seen_whole(target, camera, pose, &mut random)).collect()
+}
+
+fn write(at: &Path, name: &str, detections: &[Detection]) {
+    std::fs::create_dir(at.join(name)).unwrap();
+    for (index, found) in detections.iter().enumerate() {
+        let mut found = found.clone();
+        found.image = format!("{index}.png");
+        std::fs::write(at.join(format!("{name}/{index}.json")), detection::write(&found)).unwrap();
+    }
+}
+
+/// The exit code, the printed text and the file of a check of views.
+fn check(at: &Path, camera: &str, views: &str) -> (Option<i32>, String, Value) {
+    let args = format!("check {camera} {views} --target board.json -o {views}.json --force");
+    let result = output(at, &args);
+    let text = String::from_utf8_lossy(&result.stdout).into_owned();
+    (result.status.code(), text, json(&at.join(format!("{views}.json"))))
+}
+
+#[test]
+fn a_check_answers_unchanged_changed_or_cannot_tell() {
+    let target = board(8, 9);
+    let folder = folder(&target, &detections(&target, 20, 0.7));
+    let at = folder.path();
+    done(at, CALIBRATE);
+    let tilts = [0.5, 0.6, 0.4, 0.7, 0.5, 0.3];
+    let zoomed = Camera { focal_px: camera().focal_px * 1.03, ..camera() };
+    write(at, "same", &views(&target, &camera(), &tilts, 5));
+    write(at, "zoomed", &views(&target, &zoomed, &tilts, 6));
+    write(at, "flat", &views(&target, &camera(), &[0.0], 7));
+    let resized = views(&target, &camera(), &tilts, 8).into_iter();
+    let resized = resized.map(|mut found| {
+        (found.width, found.height) = (800, 600);
+        found
+    });
+    write(at, "resized", &resized.collect::<Vec<_>>());
+    write(at, "none", &[Detection::new("", [1600, 1200], Vec::new())]);
+
+    let (code, text, found) = check(at, "camera.json", "same");
+    assert_eq!((code, &found["answer"]), (Some(0), &"unchanged".into()), "{text}");
+    assert!(text.contains("would have been found"), "{text}");
+    let focal = &found["tests"][0];
+    assert_eq!(focal["quantity"], "focal_length");
+    assert!(focal["detectable"].as_f64().unwrap() < 1.0, "{focal}");
+
+    let (code, text, found) = check(at, "camera.json", "zoomed");
+    assert_eq!((code, &found["answer"]), (Some(1), &"changed".into()), "{text}");
+    assert_eq!(found["changed"], serde_json::json!(["focal_length"]), "{text}");
+    assert!((found["tests"][0]["change"].as_f64().unwrap() - 3.0).abs() < 0.3, "{text}");
+
+    let (code, text, found) = check(at, "camera.json", "resized");
+    assert_eq!(code, Some(1), "{text}");
+    assert_eq!(found["changed"], serde_json::json!(["resolution"]), "{text}");
+
+    for (camera, views, kind) in [
+        ("camera.json", "flat", "undetermined"),
+        ("camera.json", "none", "views"),
+        ("camera.yaml", "same", "covariance"),
+    ] {
+        let (code, text, found) = check(at, camera, views);
+        assert_eq!((code, &found["answer"]), (Some(3), &"cannot_tell".into()), "{text}");
+        assert_eq!(found["missing"][0]["kind"], kind, "{text}");
+        assert!(text.starts_with("cannot tell: "), "{text}");
+    }
+}
