@@ -14,6 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::adjust::reweighting::{Kept, Settled, settle};
 use crate::equations::block::Local;
 use crate::equations::frame::OfFrame;
+use crate::equations::minimise::{Until, minimise};
 use crate::estimate::values::CameraEstimate;
 use crate::input::calibration::Calibration;
 use crate::problem::bundle::Problem;
@@ -25,9 +26,13 @@ use crate::start::pose::{blocks, estimate_pose, fixed};
 use crate::uncertainty::board_errors::{SHEET, accuracy, sheets};
 use deltille_core::statistics::median;
 
-/// Standard deviations of the loose prior, in those of the calibration: wide enough that it removes about a thousandth of
-/// a change that the views determine, and narrow enough that others stay small.
-const LOOSE: f64 = 30.0;
+/// Standard deviations of the loose prior, in those of the calibration: wide enough that the views determine most of a
+/// change, and narrow enough that they do not drive parameters far where they hardly determine them.
+const LOOSE: f64 = 5.0;
+
+/// Factor of the covariances of the errors of the board in the calibration and in the new views. If both show the same
+/// board, these errors are correlated. Twice both covariances is a bound for every correlation.
+pub(super) const SAME_BOARD: f64 = 2.0;
 
 /// Minimum assumed standard deviation of a corner of the board, mm, so that its inverse is finite.
 const MIN_ACCURACY_MM: f64 = 1e-6;
@@ -49,9 +54,9 @@ pub(super) struct Equations {
     /// The indices of the estimated parameters of the camera; δθ has their order.
     pub free: Vec<usize>,
     /// The columns of the sheet of each panel except its scale, which the distance absorbs; the unit is an RMS
-    /// displacement of √3 α.
+    /// displacement of this over √3.
     pub sheet: Vec<usize>,
-    /// The assumed standard deviation of a corner of the board, α, mm.
+    /// The assumed standard deviation of a corner of the board, √2 α, mm.
     pub board_mm: f64,
     /// The minimum.
     pub problem: Problem,
@@ -80,11 +85,13 @@ impl Equations {
         let left_out = vec![false; problem.blocks.len()];
         let kept = Kept { problem, left_out, some_stand_out: false, factor: None };
         let Settled { minimum, whitening, .. } = settle(kept, views.weights, views.loss).ok()?;
-        let layout = minimum.layout;
-        let mut problem = minimum.problem;
-        let (whitening, floor) = at_least(&problem, whitening, earlier.common_px);
+        let (whitening, floor) = at_least(&minimum.problem, whitening, earlier.common_px);
+        // The equations assume that the poses are at their optimum for these weights.
+        let minimum = minimise(minimum.problem, &whitening, views.loss, Until::Fine)?;
+        let (layout, mut problem) = (minimum.layout, minimum.problem);
         let map = CornerMap::flat(&problem.blocks);
-        let board_mm = accuracy(&map, views.board_accuracy_mm).unwrap_or(0.0).max(MIN_ACCURACY_MM);
+        let board_mm = accuracy(&map, views.board_accuracy_mm).unwrap_or(0.0);
+        let board_mm = (SAME_BOARD.sqrt() * board_mm).max(MIN_ACCURACY_MM);
         let (n, corners) = (layout.shared, 3 * map.len());
         let sheets = sheets(&map, &SHEET) * board_mm;
         problem.map = Some(map);

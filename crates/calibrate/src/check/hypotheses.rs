@@ -31,7 +31,7 @@ const USEFUL: f64 = 0.005;
 
 /// A direction counts as determined if its eigenvalue is at least this fraction of the largest one, with all diagonal
 /// entries scaled to 1.
-const DETERMINED: f64 = 1e-10;
+const DETERMINED: f64 = 1e-6;
 
 /// The evidence on all quantities.
 pub(super) struct Evidence {
@@ -132,15 +132,15 @@ impl Evidence {
         self.p_value_beside(&self.all(), &[])
     }
 
-    /// The level of each test: of single quantities, and of all together (Bonferroni).
+    /// The level of the test of each quantity (Bonferroni).
     fn level(&self) -> f64 {
-        FALSE_ALARM / (self.quantities.len() + 1) as f64
+        FALSE_ALARM / self.quantities.len() as f64
     }
 
     /// What has changed, and what explains the views as well.
     pub(super) fn changed(&self) -> (Vec<Quantity>, Vec<Quantity>) {
         let alone = |&quantity: &Quantity| self.p_value_beside(&[quantity], &[]);
-        let is_any = self.all().iter().map(alone).fold(self.p_value(), f64::min) < self.level();
+        let is_any = self.all().iter().map(alone).fold(1.0, f64::min) < self.level();
         if !is_any {
             return (Vec::new(), Vec::new());
         }

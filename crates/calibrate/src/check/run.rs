@@ -1,9 +1,7 @@
 //! From new views to an answer.
 
-use nalgebra::DMatrix;
-
 use super::answer::{Answer, Check, Missing, Quantity, QuantityTest, Remedial};
-use super::equations::{Earlier, Equations};
+use super::equations::{Earlier, Equations, SAME_BOARD};
 use super::hypotheses::Evidence;
 use crate::estimate::values::Estimate;
 use crate::input::calibration::Calibration;
@@ -53,12 +51,14 @@ impl Calibration {
         };
         let scatter = observed.without_board();
         let excess = of_noise.information().component_mul(scatter.inner()).sum();
-        let earlier = Earlier {
-            camera,
-            covariance: &larger(observed.covariance.inner(), noise),
-            excess: (excess / noise.nrows() as f64).max(1.0),
-            common_px: before.common_px,
-        };
+        let excess = (excess / noise.nrows() as f64).max(1.0);
+        // With few frames, single directions of the scatter are too uncertain.
+        let mut covariance = scatter.inner() + noise * excess;
+        if let Some(of_board) = &observed.of_board {
+            covariance += of_board.inner() * SAME_BOARD;
+        }
+        let earlier =
+            Earlier { camera, covariance: &covariance, excess, common_px: before.common_px };
         let Some(equations) = Equations::of(self, &earlier) else { return check };
         let side_px = f64::from(size_px[0].max(size_px[1]));
         check.views = equations.problem.frames.len();
@@ -99,13 +99,6 @@ fn undecided(missing: Missing) -> Check {
         rms_px: 0.0,
         sizes_px: [[0; 2]; 2],
     }
-}
-
-/// The observed covariance, raised to that from noise: with few frames, it may be smaller by coincidence.
-fn larger(observed: &DMatrix<f64>, noise: &DMatrix<f64>) -> DMatrix<f64> {
-    let n = noise.nrows();
-    let short = |i: usize| (noise[(i, i)] / observed[(i, i)]).sqrt().max(1.0);
-    DMatrix::from_fn(n, n, |i, j| observed[(i, j)] * short(i) * short(j))
 }
 
 /// What changes the size of an image.
