@@ -118,6 +118,8 @@ impl FrameProgress {
     /// Removes the line, and reports the number of frames.
     pub fn end(self) {
         self.bar.finish_and_clear();
-        log!("{}", self.line(None));
+        if self.frames > 0 {
+            log!("{}", self.line(None));
+        }
     }
 }

@@ -17,7 +17,7 @@ const FOCAL_PX: f64 = 300.0;
 
 /// Number of poses, and of frames at each.
 const POSES: usize = 12;
-const RESTS: usize = 3;
+const RESTS: usize = 4;
 
 /// A folder with the description of a board.
 fn folder() -> tempfile::TempDir {
@@ -35,7 +35,7 @@ fn frames() -> Vec<Vec<u8>> {
         Camera::centred(width, height, FOCAL_PX, Lens::BrownConrady(BrownConrady::default()));
     let middle = target.panels[0].middle_mm();
     let frame = |index: usize| {
-        // Between poses, the board is half-way.
+        // The board moves before and after the first frame of each pose.
         let (pose, rest) = (index / RESTS, index % RESTS);
         let pose = pose as f64 + if rest == 0 { -0.5 } else { 0.0 };
         let (sin, cos) = (2.4 * pose).sin_cos();
@@ -84,7 +84,7 @@ fn a_video_becomes_a_camera() {
     write_video(&at.join("film.y4m"), &frames());
     let said = calibrated(at, "film.y4m --model plumb_bob --views 10 -o few.yaml");
     assert!(said.contains("note: --model plumb_bob is radtan5 (radtan and k3) here"), "{said}");
-    assert!(said.contains("36 frames, 36 with the target, "), "{said}");
+    assert!(said.contains("48 frames, 48 with the target, "), "{said}");
     let few = json(&at.join("few.json"));
     focal_is_right(&few);
     // The still frames are used; those in motion are not.
@@ -93,7 +93,7 @@ fn a_video_becomes_a_camera() {
         view["name"].as_str().unwrap().strip_prefix("film-").unwrap().parse().unwrap()
     };
     assert_eq!(views.len(), 10);
-    assert!(views.iter().all(|view| number(view) % RESTS != 0), "{views:?}");
+    assert!(views.iter().all(|view| number(view) % RESTS == 2), "{views:?}");
     // Without any option, a model is selected.
     calibrated(at, "film.y4m");
     focal_is_right(&json(&at.join("camera.json")));
@@ -104,7 +104,7 @@ fn photographs_become_a_camera() {
     let folder = folder();
     let at = folder.path();
     fs::create_dir(at.join("photos")).unwrap();
-    for (index, frame) in frames().into_iter().enumerate().skip(1).step_by(RESTS) {
+    for (index, frame) in frames().into_iter().enumerate().skip(2).step_by(RESTS) {
         let [width, height] = SIZE.map(|side| side as u32);
         let image = image::GrayImage::from_raw(width, height, frame).unwrap();
         image.save(at.join(format!("photos/{index}.png"))).unwrap();

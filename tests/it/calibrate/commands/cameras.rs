@@ -303,7 +303,6 @@ fn calibrate_refuses_wrong_input() {
     for args in [
         "corners camera.json --target board.json --model radtan",
         "foreign --target board.json --model radtan",
-        "blank/0.png --target board.json --model radtan",
         "corners --target corners/00.json --model radtan",
         "corners --target board.json --fixed-intrinsics camera.json",
         "corners --target board.json --fixed-intrinsics known.yaml --shape camera.json",

@@ -6,7 +6,6 @@ use std::sync::Mutex;
 
 use anyhow::{Context, bail, ensure};
 
-use super::sightings::Given;
 use crate::deltille::files::images::{Images, RecordingArgs, Stems};
 use crate::deltille::files::images_at_once;
 use crate::interrupt;
@@ -22,6 +21,15 @@ use deltille_core::words::counted;
 
 /// Default number of views of a recording: the largest number with which `--model auto` works.
 const VIEWS: u32 = 60;
+
+/// Detections before they are compared with a target.
+pub struct Given {
+    pub detections: Vec<(String, Detection)>,
+    /// The file of each detection.
+    pub files: Vec<PathBuf>,
+    /// The first path on the command line.
+    pub first: PathBuf,
+}
 
 /// Options for photographs and recordings.
 #[derive(clap::Args)]
@@ -167,9 +175,9 @@ impl Film<'_> {
             }
             let found =
                 frame.and_then(|frame| self.one(frame, |image, name| tracker.detect(image, name)));
-            progress.add(found.as_ref().is_ok_and(|(_, found)| !found.grids.is_empty()), part);
             match found {
                 Ok((stem, found)) => {
+                    progress.add(!found.grids.is_empty(), part);
                     inks.push(found.ink);
                     keyframes.add(stem, found);
                 }
@@ -201,8 +209,10 @@ impl Film<'_> {
             }
             let found = frame
                 .and_then(|frame| self.one(frame, |image, name| self.detector.detect(image, name)));
-            let is_seen = found.as_ref().is_ok_and(|(_, found)| !found.grids.is_empty());
-            progress.lock().expect("no thread panics here").add(is_seen, None);
+            if let Ok((_, found)) = &found {
+                let mut progress = progress.lock().expect("no thread panics here");
+                progress.add(!found.grids.is_empty(), None);
+            }
             seen.lock().expect("no thread panics here").insert(index, found);
         });
         progress.into_inner().expect("no thread panics here").end();

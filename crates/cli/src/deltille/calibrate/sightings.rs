@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow, bail, ensure};
 use clap::ValueEnum;
 
-use super::filming::{self, FilmArgs};
+use super::filming::{self, FilmArgs, Given};
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::{camera_file, detection_tables, target_file};
 use crate::output::log;
@@ -169,7 +169,7 @@ impl SightingsArgs {
             false => given(&self.inputs, &limits)?,
         };
         let Read { mut views, empty, mut left_out, ink, detections } =
-            shown(given.read(&reference, self.assume_target)?)?;
+            shown(views_of(given, &reference, self.assume_target)?)?;
         let board = match reference {
             Reference::Grid(grid) if measure_target => {
                 let made = grid
@@ -313,16 +313,7 @@ pub fn read_any(
     limits: &Limits,
     is_assumed: bool,
 ) -> anyhow::Result<Read> {
-    given(paths, limits)?.read(reference, is_assumed)
-}
-
-/// Detections before they are compared with a target.
-pub struct Given {
-    pub detections: Vec<(String, Detection)>,
-    /// The file of each detection.
-    pub files: Vec<PathBuf>,
-    /// The first path on the command line.
-    pub first: PathBuf,
+    views_of(given(paths, limits)?, reference, is_assumed)
 }
 
 /// Reads detection files or folders.
@@ -381,26 +372,23 @@ fn given(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Given> {
     Ok(Given { detections, files, first: paths[0].clone() })
 }
 
-impl Given {
-    /// Converts the detections to views.
-    fn read(self, reference: &Reference, is_assumed: bool) -> anyhow::Result<Read> {
-        let Self { mut detections, files, first } = self;
-        if is_assumed {
-            assume(&mut detections, reference);
-        }
-        let ViewSet { views, empty, excluded: left_out, mixed, .. } =
-            views(&detections, reference)?;
-        if let Some(mixed) = mixed {
-            log!("warning: {}: {mixed}", first.display());
-        }
-        for (index, out) in &left_out {
-            log!("warning: excluded: {}: {}", files[*index].display(), out.reason);
-        }
-        let empty = empty.into_iter().map(|index| files[index].clone()).collect();
-        let left_out = left_out.into_iter().map(|(_, out)| out).collect();
-        let ink = ink_of(&detections, reference);
-        Ok(Read { views, empty, left_out, ink, detections })
+/// Converts detections to views.
+fn views_of(given: Given, reference: &Reference, is_assumed: bool) -> anyhow::Result<Read> {
+    let Given { mut detections, files, first } = given;
+    if is_assumed {
+        assume(&mut detections, reference);
     }
+    let ViewSet { views, empty, excluded: left_out, mixed, .. } = views(&detections, reference)?;
+    if let Some(mixed) = mixed {
+        log!("warning: {}: {mixed}", first.display());
+    }
+    for (index, out) in &left_out {
+        log!("warning: excluded: {}: {}", files[*index].display(), out.reason);
+    }
+    let empty = empty.into_iter().map(|index| files[index].clone()).collect();
+    let left_out = left_out.into_iter().map(|(_, out)| out).collect();
+    let ink = ink_of(&detections, reference);
+    Ok(Read { views, empty, left_out, ink, detections })
 }
 
 /// Assigns all detections to the given targets; notes once if they name another target.
