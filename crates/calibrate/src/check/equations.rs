@@ -126,7 +126,7 @@ impl Equations {
         let mut prior = DMatrix::identity(n + corners + count, n + corners + count);
         prior.view_mut((0, 0), (n, n)).copy_from(tight.information());
         (n..n + corners).for_each(|i| prior[(i, i)] = board_mm.powi(-2));
-        let is_sheet = |column: &usize| (column - n - corners) % SHEET.len() != 0;
+        let is_sheet = |column: &usize| !(column - n - corners).is_multiple_of(SHEET.len());
         let sheet = (n + corners..n + corners + count).filter(is_sheet).collect();
         let freedom = 2.0 * problem.count() as f64 - 6.0 * problem.frames.len() as f64 - n as f64;
         let (residual, all): (f64, f64) = problem
