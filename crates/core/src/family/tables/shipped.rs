@@ -94,20 +94,9 @@ pub fn smallest_shipped(
         .min_by_key(|family| (family.bits, std::cmp::Reverse(family.distance), family.codes))
 }
 
-/// Returns the text of a shipped family. Without the feature `families`, only that of position codes is part of the program.
+/// Returns the text of a shipped family.
 pub(in crate::family) fn json(name: &str) -> Option<&'static str> {
-    match whole(name).as_ref() {
-        positions::NAME => Some(include_str!("../../../families/dense9.json")),
-        #[cfg(feature = "families")]
-        name => of_tables(name),
-        #[cfg(not(feature = "families"))]
-        _ => None,
-    }
-}
-
-#[cfg(feature = "families")]
-fn of_tables(name: &str) -> Option<&'static str> {
-    Some(match name {
+    Some(match whole(name).as_ref() {
         "d16h5" => include_str!("../../../families/d16h5.json"),
         "d25h7" => include_str!("../../../families/d25h7.json"),
         "d25h9" => include_str!("../../../families/d25h9.json"),
@@ -120,6 +109,7 @@ fn of_tables(name: &str) -> Option<&'static str> {
         "delTag25h9" => include_str!("../../../families/delTag25h9.json"),
         "delTag36h9" => include_str!("../../../families/delTag36h9.json"),
         "delTag36h11" => include_str!("../../../families/delTag36h11.json"),
+        positions::NAME => include_str!("../../../families/dense9.json"),
         "aprilTag16h5" => include_str!("../../../families/aprilTag16h5.json"),
         "aprilTag25h9" => include_str!("../../../families/aprilTag25h9.json"),
         "aprilTag36h11" => include_str!("../../../families/aprilTag36h11.json"),
