@@ -17,7 +17,7 @@ use crate::problem::{FramesError, Problem};
 pub struct FrameOptions {
     /// The topic of a recording; needed if several contain images.
     pub topic: Option<String>,
-    /// Number of frames of a recording of which the first is read; 0 and 1 for all.
+    /// Every n-th frame of a recording is read; 0 and 1 for all.
     pub every: u64,
     /// Number of the first frame of a recording that is read.
     pub start: u64,

@@ -225,7 +225,7 @@ pub struct Check {
     pub answer: Answer,
     /// What has changed: these quantities together. Empty if nothing has.
     pub changed: Vec<Quantity>,
-    /// Other quantities, each of which alone explains the views as well as [`changed`](Self::changed).
+    /// Other quantities, each alone explaining the views as well as [`changed`](Self::changed).
     pub or: Vec<Quantity>,
     /// Why there is no answer.
     pub missing: Vec<Missing>,

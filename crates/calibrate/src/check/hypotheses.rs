@@ -1,4 +1,4 @@
-//! Tests of which quantities have changed.
+//! Tests for changed quantities.
 //!
 //! ```text
 //!   T(S) = s_Sᵀ A_SS⁻¹ s_S          for the changes of some quantities S; F with dim S and ν degrees of freedom

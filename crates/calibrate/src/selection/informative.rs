@@ -16,7 +16,7 @@ use crate::input::sample::evenly;
 use crate::model::Model;
 use crate::next_view::gain::{Gain, ViewGain};
 
-/// Models of the provisional calibration, of which the one that fits better is used: one for normal lenses, one for
+/// Models of the provisional calibration, the better fitting one is used: one for normal lenses, one for
 /// fisheyes.
 const PROVISIONAL: [Model; 2] = [Model::Radtan5, Model::KannalaBrandt(4)];
 

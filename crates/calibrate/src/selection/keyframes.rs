@@ -144,7 +144,7 @@ fn pairwise_stillest(frames: Vec<Keyframe>) -> Vec<Keyframe> {
     stillest
 }
 
-/// The larger of two displacements, of which either may be unknown.
+/// The larger of two displacements; either may be unknown.
 fn larger(before_px: f64, after_px: Option<f64>) -> f64 {
     match after_px {
         Some(after_px) if before_px.is_finite() => before_px.max(after_px),

@@ -19,7 +19,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use deltille::clock;
 use deltille_core::statistics::{median, quantile};
 
-/// Number of runs of which the fastest counts: it is the one least slowed down by other processes.
+/// Number of runs. The fastest counts: it is the one least slowed down by other processes.
 const RUNS: usize = 3;
 
 /// Reason why a run time cannot be measured.

@@ -49,7 +49,7 @@ fn camera(
     Ok(Row::new(what, &[ms], format!("rms {:.4} px", estimate.cameras[0].rms_px)))
 }
 
-/// Returns views of a board, each of which shows all of it.
+/// Returns views of a board that show all of it.
 fn views(count: usize, [rows, cols]: [i32; 2], off_mm: f64, seed: u64) -> Vec<View> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let radial = [-0.2, 0.06, 0.0];
