@@ -324,8 +324,7 @@ impl OneTiling {
         let mut grids = self.plausible::<N>(frame, &found, &mut left_out);
         let of_found = left_out.len();
         timing.lap("labels");
-        let is_worth = how == Search::Thorough || !grids.is_empty();
-        let is_worth = is_worth && self.is_sought();
+        let is_worth = self.is_sought() && (how == Search::Thorough || !grids.is_empty());
         let is_other = |grid: &&SaddleGrid| grid.len() > LARGER * self.labels.most_corners();
         let others = found.iter().filter(is_other).flat_map(|grid| grid.values());
         let others: Vec<DVec2> = others.map(|placed| placed.position).collect();

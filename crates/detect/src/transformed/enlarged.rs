@@ -60,8 +60,6 @@ pub(crate) fn enlarged_grids<const N: usize>(
 /// Returns a region of an image at twice its size, with linear interpolation.
 fn enlarged(image: ImageView, region: &Region) -> Gray<u16> {
     let [columns, rows] = region.bounds();
-    let columns = columns.start..columns.end.min(image.width());
-    let rows = rows.start..rows.end.min(image.height());
     let (width, height) = (columns.len(), rows.len());
     let mut enlarged = Gray::new(2 * width, 2 * height);
     // Three quarters of the nearest pixel and a quarter of the next, along rows and columns.

@@ -16,7 +16,7 @@ use glam::DVec2;
 use nalgebra::{Matrix2, SymmetricEigen, Vector2};
 use rayon::prelude::*;
 
-use super::regions::{Blocks, Region};
+use super::regions::{Blocks, OUTSIDE, Region};
 use crate::corners::saddles::{SaddleFinder, sample_noise};
 use crate::grid::grids::grids;
 use crate::grid::saddle_grid::SaddleGrid;
@@ -43,9 +43,6 @@ const SLACK_PX: f64 = 0.1;
 /// Step below which a row of a view counts as level, px. It rises by less than the tolerance in a hundred million
 /// pixels.
 const LEVEL_STEP: f64 = 1e-9;
-
-/// Value outside the image, on a scale of 0 to 1023: neither dark nor bright.
-const OUTSIDE: i16 = 512;
 
 /// Number of pixels of a view that are drawn together, or not at all.
 const RUN: usize = 8;
@@ -99,7 +96,7 @@ pub(crate) fn foreshortened_grids<const N: usize>(
         }
     };
     let seen = |angle: f64, region: &Region| -> Vec<SaddleGrid> {
-        let view = View::new(&levels[level], angle, region);
+        let view = View::new(angle, region);
         let drawn = view.drawn(&levels[level]);
         let compressed = Pyramid::new(&drawn, levels.len() - level, MIN_LEVEL_SIDE);
         let saddles = finder.find_in(&compressed, noise.sigma);
@@ -131,17 +128,14 @@ struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    fn new(image: &Gray<i16>, angle: f64, region: &'a Region) -> Self {
+    fn new(angle: f64, region: &'a Region) -> Self {
         let along = Vector2::new(angle.cos(), angle.sin());
         let view_from_picture = Matrix2::identity() - (1.0 - WIDTH) * along * along.transpose();
         let picture_from_view =
             Matrix2::identity() + (1.0 / WIDTH - 1.0) * along * along.transpose();
         let [columns, rows] = region.bounds();
         let first = Vector2::new(columns.start as f64, rows.start as f64);
-        let end = Vector2::new(
-            columns.end.min(image.width()) as f64,
-            rows.end.min(image.height()) as f64,
-        );
+        let end = Vector2::new(columns.end as f64, rows.end as f64);
         let view = view_from_picture.abs() * (end - first);
         let half_px = Vector2::repeat(0.5);
         Self {
@@ -231,7 +225,7 @@ mod tests {
         });
         let region = Region::whole(&image);
         for angle in (0..DIRECTIONS).map(|i| PI * i as f64 / DIRECTIONS as f64) {
-            let view = View::new(&image, angle, &region);
+            let view = View::new(angle, &region);
             let drawn = view.drawn(&image);
             let (mut sum, mut middle) = (0.0, DVec2::ZERO);
             for y in 0..drawn.height() {

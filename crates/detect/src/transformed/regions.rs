@@ -16,6 +16,9 @@ use multiversion::multiversion;
 
 use deltille_core::raster::{Gray, Intensity, Pyramid, bands};
 
+/// Value outside a region, on a scale of 0 to 1023: neither dark nor bright.
+pub(super) const OUTSIDE: i16 = 512;
+
 /// Side of a block, px.
 const BLOCK: usize = 16;
 
@@ -60,8 +63,8 @@ const OVER_NOISE: f32 = 2.0;
 /// Blocks of an image.
 #[derive(Clone, Debug)]
 pub(crate) struct Region {
-    /// Number of columns and rows of blocks in the image.
-    all: [usize; 2],
+    /// Width and height of the image, px.
+    size: [usize; 2],
     /// Columns and rows of blocks of the bounding box.
     bounds: [Range<usize>; 2],
     /// Which blocks of the bounding box belong to the region, by rows.
@@ -71,18 +74,19 @@ pub(crate) struct Region {
 impl Region {
     /// Returns the whole of an image.
     pub(crate) fn whole<T: Intensity>(image: &Gray<T>) -> Self {
-        let all = [image.width(), image.height()].map(|side| (side / BLOCK).max(1));
-        Self { all, bounds: all.map(|side| 0..side), is_part: vec![true; all[0] * all[1]] }
+        let size = [image.width(), image.height()];
+        let all = blocks_in(size);
+        Self { size, bounds: all.map(|side| 0..side), is_part: vec![true; all[0] * all[1]] }
     }
 
     /// Returns the region of some blocks, at least one.
-    fn of(all: [usize; 2], blocks: &[[usize; 2]]) -> Self {
+    fn of(size: [usize; 2], blocks: &[[usize; 2]]) -> Self {
         let bounds = [0, 1].map(|axis| {
             let places = || blocks.iter().map(|block| block[axis]);
             places().min().unwrap_or(0)..places().max().unwrap_or(0) + 1
         });
         let mut region =
-            Self { all, is_part: vec![false; bounds[0].len() * bounds[1].len()], bounds };
+            Self { size, is_part: vec![false; bounds[0].len() * bounds[1].len()], bounds };
         for &block in blocks {
             if let Some(index) = region.index(block) {
                 region.is_part[index] = true;
@@ -100,18 +104,14 @@ impl Region {
 
     /// Returns whether the block of a pixel belongs to it. Pixels beyond the last whole block belong to that block.
     fn has_block_of(&self, [x, y]: [usize; 2]) -> bool {
-        let block = [x / BLOCK, y / BLOCK];
-        let block = [0, 1].map(|axis| block[axis].min(self.all[axis] - 1));
+        let [columns, rows] = blocks_in(self.size);
+        let block = [(x / BLOCK).min(columns - 1), (y / BLOCK).min(rows - 1)];
         self.index(block).is_some_and(|index| self.is_part[index])
     }
 
     /// Returns its bounding box in a level of a pyramid, with grey outside the region.
     pub(crate) fn cut_from(&self, image: &Gray<i16>) -> Gray<i16> {
-        /// Neither dark nor bright, on a scale of 0 to 1023.
-        const OUTSIDE: i16 = 512;
         let [columns, rows] = self.bounds();
-        let columns = columns.start..columns.end.min(image.width());
-        let rows = rows.start..rows.end.min(image.height());
         let mut cut = Gray::new(columns.len(), rows.len());
         for y in rows.clone() {
             let row = cut.row_mut(y - rows.start);
@@ -144,16 +144,22 @@ impl Region {
 
     /// Returns the columns and rows of pixels of its bounding box, with those beyond the last whole block of the image.
     pub(crate) fn bounds(&self) -> [Range<usize>; 2] {
+        let all = blocks_in(self.size);
         [0, 1].map(|axis| {
             let Range { start, end } = self.bounds[axis];
-            let beyond = if end == self.all[axis] { BLOCK } else { 0 };
-            BLOCK * start..BLOCK * end + beyond
+            BLOCK * start..if end == all[axis] { self.size[axis] } else { BLOCK * end }
         })
     }
 }
 
+/// Returns the number of columns and rows of blocks in an image.
+fn blocks_in(size: [usize; 2]) -> [usize; 2] {
+    size.map(|side| (side / BLOCK).max(1))
+}
+
 /// Returns connected regions of the blocks that are set, by rows.
-fn connected([columns, rows]: [usize; 2], mut is_set: Vec<bool>) -> Vec<Region> {
+fn connected(size: [usize; 2], mut is_set: Vec<bool>) -> Vec<Region> {
+    let [columns, rows] = blocks_in(size);
     let mut regions = Vec::new();
     for first in 0..is_set.len() {
         let (mut blocks, mut reached) = (Vec::new(), vec![first]);
@@ -166,7 +172,7 @@ fn connected([columns, rows]: [usize; 2], mut is_set: Vec<bool>) -> Vec<Region> 
             }
         }
         if !blocks.is_empty() {
-            regions.push(Region::of([columns, rows], &blocks));
+            regions.push(Region::of(size, &blocks));
         }
     }
     regions
@@ -180,8 +186,8 @@ fn near(index: usize, reach: usize, count: usize) -> Range<usize> {
 /// Averages of the brightness and its gradient over blocks of an image.
 #[derive(Clone, Debug)]
 pub(crate) struct Blocks {
-    columns: usize,
-    rows: usize,
+    /// Width and height of the image, px.
+    size: [usize; 2],
     averages: Vec<Averages>,
     /// Whether other objects are known to be there.
     is_taken: Vec<bool>,
@@ -203,7 +209,8 @@ impl Blocks {
     /// px of level 0, do not become part of any region.
     pub(crate) fn of(pyramid: &Pyramid, level: usize, others: &[DVec2]) -> Self {
         let image = &pyramid.levels()[level];
-        let [columns, rows] = [image.width() / BLOCK, image.height() / BLOCK];
+        let size = [image.width(), image.height()];
+        let [columns, rows] = blocks_in(size);
         let averages = bands(0..rows, columns * BLOCK * BLOCK, |band| {
             let mut averages = Vec::with_capacity(band.len() * columns);
             for v in band {
@@ -221,12 +228,12 @@ impl Blocks {
                 is_taken[v * columns..][near(u, AROUND, columns)].fill(true);
             }
         }
-        Self { columns, rows, averages, is_taken }
+        Self { size, averages, is_taken }
     }
 
     /// Returns the blocks that satisfy `is`, and those around them, as connected regions.
     fn regions(&self, is: impl Fn(usize) -> bool) -> Vec<Region> {
-        let Self { columns, rows, .. } = *self;
+        let [columns, rows] = blocks_in(self.size);
         let mut is_part = vec![false; columns * rows];
         for i in (0..columns * rows).filter(|&i| !self.is_taken[i] && is(i)) {
             let [u, v] = [i % columns, i / columns];
@@ -234,7 +241,7 @@ impl Blocks {
                 is_part[row * columns..][near(u, AROUND, columns)].fill(true);
             }
         }
-        connected([columns, rows], is_part)
+        connected(self.size, is_part)
     }
 
     /// Returns where the image may show tiles of less than about 30 px that are at most twice as long as wide.
@@ -289,15 +296,15 @@ impl Blocks {
 
     /// Returns the averages over the squares around each block.
     fn squares(&self, around: usize) -> Vec<Averages> {
-        let Self { columns, rows, averages, .. } = self;
+        let ([columns, rows], averages) = (blocks_in(self.size), &self.averages);
         let along = |i: usize| {
-            let row = &averages[i / columns * columns..][..*columns];
-            Averages::of_all(&row[near(i % columns, around, *columns)])
+            let row = &averages[i / columns * columns..][..columns];
+            Averages::of_all(&row[near(i % columns, around, columns)])
         };
         let along: Vec<Averages> = (0..averages.len()).map(along).collect();
         let across = |i: usize| {
             let of_row = |v: usize| along[v * columns + i % columns];
-            let column: Vec<Averages> = near(i / columns, around, *rows).map(of_row).collect();
+            let column: Vec<Averages> = near(i / columns, around, rows).map(of_row).collect();
             Averages::of_all(&column)
         };
         (0..averages.len()).map(across).collect()
@@ -426,12 +433,12 @@ mod tests {
         let image = &board.levels()[0];
         let mut is_set = vec![false; 20 * 15];
         [(4, 2), (5, 2), (5, 3), (19, 14)].iter().for_each(|(u, v)| is_set[v * 20 + u] = true);
-        let [first, second] = &connected([20, 15], is_set)[..] else { panic!("two regions") };
+        let [first, second] = &connected([320, 240], is_set)[..] else { panic!("two regions") };
         let cut = first.cut_from(image);
         assert_eq!([cut.width(), cut.height()], [32, 32]);
         assert_eq!([cut.at(0, 0), cut.at(31, 31)], [image.at(64, 32), image.at(95, 63)]);
         assert_eq!(cut.at(15, 16), 512);
-        assert_eq!(second.bounds(), [304..336, 224..256]);
+        assert_eq!(second.bounds(), [304..320, 224..240]);
         assert_eq!(second.cut_from(image).width(), 16);
     }
 }
