@@ -99,11 +99,6 @@ impl Keyframes {
         }
     }
 
-    /// Returns the number of frames that are kept.
-    pub fn count(&self) -> usize {
-        self.kept.len() + usize::from(self.last.is_some())
-    }
-
     /// Returns the frames in the order of the recording.
     pub fn finish(mut self) -> Vec<Keyframe> {
         if let Some((frame, positions)) = self.last.take() {
