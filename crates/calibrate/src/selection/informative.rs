@@ -186,7 +186,9 @@ mod tests {
         let selected = calibration.informative_views(&motion_px, 12);
         assert_eq!(selected.len(), 12);
         assert!(selected.iter().all(|index| index % 5 != 0), "{selected:?}");
-        assert!(selected.iter().filter(|index| is_tilted(**index)).count() >= 8, "{selected:?}");
+        // Only tilted views determine the focal length. Once a few do, others determine the distortion as well as they do.
+        let first = calibration.informative_views(&motion_px, 5);
+        assert!(first.iter().all(|&index| is_tilted(index) && index % 5 != 0), "{first:?}");
         assert_eq!(calibration.informative_views(&motion_px, 40).len(), 40);
     }
 }
