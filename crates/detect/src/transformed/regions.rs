@@ -44,6 +44,13 @@ const MIN_EVEN_VARIANCE: f32 = 0.05;
 /// 3 px leaves three quarters of their contrast.
 const MIN_EDGES: f32 = 0.03;
 
+/// The same for strong blur or motion, which weakens gradients but hardly the variance of tiles that are larger than it: that
+/// of motion of 15 px across tiles of 38 px is 0.02, with a variance of 0.07 or more.
+const MIN_BLURRED_EDGES: f32 = 0.015;
+
+/// The variance that is then needed. Most of what has such weak gradients has less.
+const MIN_BLURRED_VARIANCE: f32 = 0.06;
+
 /// The same for the direction with the weaker edges, if tiles are at most twice as long as wide.
 const MIN_EVEN_EDGES: f32 = 0.01;
 
@@ -258,9 +265,11 @@ impl Blocks {
     pub(crate) fn small_tiles(&self) -> Vec<Region> {
         let squares = self.squares(AROUND);
         self.regions(|i| {
-            let [xx, _, yy] = squares[i].gradients;
-            squares[i].has_variance(MIN_VARIANCE)
-                && xx + yy > MIN_EDGES * squares[i].squared_range()
+            let ([xx, _, yy], squared_range) = (squares[i].gradients, squares[i].squared_range());
+            let is_dense = |variance, edges| {
+                squares[i].has_variance(variance) && xx + yy > edges * squared_range
+            };
+            is_dense(MIN_VARIANCE, MIN_EDGES) || is_dense(MIN_BLURRED_VARIANCE, MIN_BLURRED_EDGES)
         })
     }
 
