@@ -16,9 +16,13 @@
 
 use std::sync::Arc;
 
+use multiversion::multiversion;
 use nalgebra::DMatrix;
 use rand::{RngCore, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+
+use crate::lanes::{LANES, dot, sum};
+use crate::refine::blurred_corner::exp_negative;
 
 /// Maximum information in a tile, nats. The likelihood of a word that is shown is then a tenth of the sum over random
 /// words.
@@ -30,11 +34,14 @@ const COUNT: usize = 8192;
 /// Halvings of the interval of the noise.
 const HALVINGS: usize = 20;
 
+/// Number of words whose signs are read together, so that they and their sums stay in the nearest cache.
+const GROUP: usize = 256;
+
 /// Random words.
 #[derive(Clone, Debug)]
 pub(super) struct RandomWords {
-    /// ±1 for each word, by bit.
-    signs: Vec<Vec<f32>>,
+    /// ±1 for each word of a group, by group and bit.
+    groups: Vec<Vec<[f32; GROUP]>>,
 }
 
 impl RandomWords {
@@ -42,18 +49,70 @@ impl RandomWords {
     pub(super) fn new(bits: usize) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         let words: Vec<u64> = (0..COUNT).map(|_| rng.next_u64()).collect();
-        let signs = (0..bits).map(|bit| words.iter().map(|&word| sign(word, bit)).collect());
-        Self { signs: signs.collect() }
+        let of_group = |words: &[u64]| {
+            (0..bits).map(|bit| std::array::from_fn(|k| sign(words[k], bit))).collect()
+        };
+        Self { groups: words.chunks_exact(GROUP).map(of_group).collect() }
     }
+}
 
-    /// Returns the sum of one factor for each bit, by word.
-    fn sums(&self, factors: &[f32]) -> Vec<f32> {
-        let mut sums = vec![0.0; COUNT];
-        for (signs, factor) in self.signs.iter().zip(factors) {
-            sums.iter_mut().zip(signs).for_each(|(sum, sign)| *sum += sign * factor);
+/// Returns the sum of one factor for each bit, by word of a group.
+#[inline(always)]
+fn sums_of_group(group: &[[f32; GROUP]], factors: &[f32]) -> [f32; GROUP] {
+    let mut sums = [0.0; GROUP];
+    for (signs, &factor) in group.iter().zip(factors) {
+        for k in 0..GROUP {
+            sums[k] += signs[k] * factor;
         }
-        sums
     }
+    sums
+}
+
+/// Returns the same for all words.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn sums(random: &RandomWords, factors: &[f32]) -> Vec<f32> {
+    let mut sums = Vec::with_capacity(COUNT);
+    for group in &random.groups {
+        sums.extend_from_slice(&sums_of_group(group, factors));
+    }
+    sums
+}
+
+/// Returns ½ sᵀAs of all words, given the rows of A.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn half_squares(random: &RandomWords, matrix: &[Vec<f32>]) -> Vec<f32> {
+    let mut squares = Vec::with_capacity(COUNT);
+    for group in &random.groups {
+        let mut of_group = [0.0; GROUP];
+        for (row, signs) in matrix.iter().zip(group) {
+            let sums = sums_of_group(group, row);
+            for k in 0..GROUP {
+                of_group[k] += 0.5 * sums[k] * signs[k];
+            }
+        }
+        squares.extend_from_slice(&of_group);
+    }
+    squares
+}
+
+/// Returns ln Σ exp of the values, whose number is a multiple of [`LANES`].
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn ln_sum_exp(values: &[f32]) -> f32 {
+    let (values, _) = values.as_chunks::<LANES>();
+    let mut most = [f32::NEG_INFINITY; LANES];
+    for values in values {
+        for k in 0..LANES {
+            most[k] = if values[k] > most[k] { values[k] } else { most[k] };
+        }
+    }
+    let most = most.into_iter().fold(f32::NEG_INFINITY, f32::max);
+    let mut sums = [0.0; LANES];
+    for values in values {
+        for k in 0..LANES {
+            sums[k] += exp_negative(values[k] - most);
+        }
+    }
+    most + sum(&sums).ln()
 }
 
 /// The likelihood of the words of a tile under one blur.
@@ -107,32 +166,23 @@ impl JointModel {
             m.row_iter().map(|row| row.iter().map(|&v| v as f32).collect()).collect()
         };
         let (matrix, gain) = (rows(&matrix), rows(&gain));
-        let (random, mut squares) = (random(), vec![0.0; COUNT]);
-        for (row, signs) in matrix.iter().zip(&random.signs) {
-            let sums = random.sums(row);
-            let terms = sums.iter().zip(signs).map(|(sum, sign)| 0.5 * sum * sign);
-            squares.iter_mut().zip(terms).for_each(|(square, term)| *square += term);
-        }
-        Some(Self { matrix, gain, random: squares })
+        let random = half_squares(random(), &matrix);
+        Some(Self { matrix, gain, random })
     }
 
     /// Returns ½ sᵀAs of a word.
     pub(crate) fn half_square(&self, word: u64) -> f32 {
-        let of_bit = |(bit, row): (usize, &Vec<f32>)| {
-            sign(word, bit) * row.iter().enumerate().map(|(k, a)| sign(word, k) * a).sum::<f32>()
-        };
-        0.5 * self.matrix.iter().enumerate().map(of_bit).sum::<f32>()
+        let signs: Vec<f32> = (0..self.matrix.len()).map(|bit| sign(word, bit)).collect();
+        let of_bit = |(sign, row): (&f32, &Vec<f32>)| sign * dot(row, &signs);
+        0.5 * signs.iter().zip(&self.matrix).map(of_bit).sum::<f32>()
     }
 
     /// Returns the odds of all words, given the samples minus their middle.
     pub(super) fn odds(self: &Arc<Self>, off_middle: &[f32], random: &RandomWords) -> JointOdds {
-        let product = |row: &Vec<f32>| row.iter().zip(off_middle).map(|(g, off)| g * off).sum();
-        let linear: Vec<f32> = self.gain.iter().map(product).collect();
-        let sums = random.sums(&linear);
-        let likelihoods = || sums.iter().zip(&self.random).map(|(sum, square)| sum - square);
-        let most = likelihoods().fold(f32::NEG_INFINITY, f32::max);
-        let sum = likelihoods().map(|l| (l - most).exp()).sum::<f32>();
-        JointOdds { model: Arc::clone(self), linear, of_random: most + sum.ln() }
+        let linear: Vec<f32> = self.gain.iter().map(|row| dot(row, off_middle)).collect();
+        let mut likelihoods = sums(random, &linear);
+        likelihoods.iter_mut().zip(&self.random).for_each(|(sum, square)| *sum -= square);
+        JointOdds { model: Arc::clone(self), linear, of_random: ln_sum_exp(&likelihoods) }
     }
 }
 

@@ -21,11 +21,13 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use glam::DVec2;
+use multiversion::multiversion;
 use nalgebra::{DMatrix, Matrix2, Vector2};
 
 use super::grid_blur::GridBlur;
 use super::joint_cells::{JointModel, JointOdds, RandomWords};
-use crate::refine::blurred_corner::{erf_sqrt_half, swept_edge};
+use crate::lanes::{LANES, dot};
+use crate::refine::blurred_corner::{erf_sqrt_half, exp_negative, swept_edge};
 use deltille_core::lattice::{GridKind, TagCells};
 
 /// Subdivision of a cell: a triangle has 3² parts, a square twice as many.
@@ -67,9 +69,8 @@ const NOISE_WEIGHT: f64 = 1.5;
 /// 1, because no covariance has a correlation of 1.
 const MAX_CORRELATION: f64 = 0.95;
 
-/// Squared distance, in σ of the blur, beyond which a part of a cell is ignored. Its weight there is e⁻⁸ of that in the
-/// centre.
-const FAR_SIGMAS2: f64 = 16.0;
+/// Largest number of cells.
+const MAX_CELLS: usize = 64;
 
 /// Minimum variance of a cell. With less, its odds exceed [`MAX_HALF_ODDS`] anyway.
 const MIN_VARIANCE: f64 = 1e-3;
@@ -108,12 +109,30 @@ pub(crate) struct CellModel {
     margin_bits: f64,
     /// Sample positions, in tile coordinates.
     points: Vec<DVec2>,
-    /// Parts of the cells: bit, and centre in tile coordinates.
-    parts: Vec<(usize, DVec2)>,
+    /// Parts of the cells: each has one in every cell.
+    parts: Vec<Part>,
     /// Words with which those of blurred tags are compared.
     random: OnceLock<RandomWords>,
     /// Mixings that were computed before, by quantised blur.
     mixings: Arc<Mutex<BTreeMap<[i32; 6], Arc<Mixing>>>>,
+}
+
+/// Centres of one part of every cell, bit-widths along u and v, by bit; zeros up to whole vectors.
+#[derive(Clone, Debug)]
+struct Part {
+    u: Vec<f32>,
+    v: Vec<f32>,
+}
+
+/// The density of a blur relative to its maximum; with motion, its mean over the motion.
+#[derive(Clone, Copy, Debug)]
+struct Kernel {
+    /// Inverse covariance uu, uv, vv, 1/bit-widths².
+    inverse: [f32; 3],
+    /// Component along the motion of an offset, in σ of the blur: its factors for u and v.
+    along: [f32; 2],
+    /// Half of the motion, in σ of the blur.
+    reach: f32,
 }
 
 /// Blur in tile coordinates, and noise.
@@ -169,14 +188,22 @@ impl CellModel {
             let half_way = move |corner: DVec2| corner.midpoint(centre);
             std::iter::once(centre).chain(corners.into_iter().map(half_way))
         });
-        let parts = (0..bits).flat_map(|bit| {
-            let middles = parts_of(&cells.corners(bit, inset_bits));
-            middles.into_iter().map(move |middle| (bit as usize, middle))
-        });
+        let width = cells.width(inset_bits);
+        let of_cells: Vec<Vec<DVec2>> =
+            (0..bits).map(|bit| parts_of(&cells.corners(bit, inset_bits))).collect();
+        let part = |part: usize| {
+            let [mut u, mut v] =
+                [(); 2].map(|()| vec![0.0; of_cells.len().next_multiple_of(LANES)]);
+            for (bit, centres) in of_cells.iter().enumerate() {
+                [u[bit], v[bit]] = (width * centres[part]).as_vec2().to_array();
+            }
+            Part { u, v }
+        };
+        let parts = (0..of_cells.first().map_or(0, Vec::len)).map(part);
         Self {
             kind: cells.kind(),
             bits: bits as usize,
-            width: cells.width(inset_bits),
+            width,
             margin_bits,
             points: points.collect(),
             parts: parts.collect(),
@@ -269,26 +296,27 @@ impl CellModel {
         if determinant <= 0.0 || determinant.is_nan() {
             return None;
         }
-        let product = |a: DVec2, b: DVec2| {
-            (vv * a.x * b.x - uv * (a.x * b.y + a.y * b.x) + uu * a.y * b.y) / determinant
+        let inverse = [vv / determinant, -uv / determinant, uu / determinant];
+        let pull = DVec2::new(
+            inverse[0] * way.x + inverse[1] * way.y,
+            inverse[1] * way.x + inverse[2] * way.y,
+        );
+        let reach = pull.dot(way).sqrt();
+        let reach = if reach < MIN_WAY_SIGMAS { 0.0 } else { reach };
+        let along = if reach > 0.0 { pull / reach } else { DVec2::ZERO };
+        let kernel = Kernel {
+            inverse: inverse.map(|part| part as f32),
+            along: along.as_vec2().to_array(),
+            reach: reach as f32,
         };
-        let way_sigmas = product(way, way).sqrt();
         let (n, bits) = (self.points.len(), self.bits);
         let mut design = DMatrix::<f64>::zeros(n, bits + LEVELS);
-        let part_area = 1.0 / (self.parts.len() / bits) as f64 * self.cell_area();
+        let part_area = self.cell_area() / self.parts.len() as f64;
         let gain = part_area / (std::f64::consts::TAU * determinant.sqrt());
         for (i, point) in self.points.iter().enumerate() {
-            for &(bit, part) in &self.parts {
-                let off = (point - part) * self.width;
-                design[(i, bit)] += 0.5
-                    * gain
-                    * if way_sigmas < MIN_WAY_SIGMAS {
-                        near(product(off, off))
-                    } else {
-                        let along = product(off, way) / way_sigmas;
-                        let across2 = product(off, off) - along * along;
-                        near(across2) * mean_bell(along, way_sigmas)
-                    };
+            let sums = sums_by_cell(&self.parts, (self.width * point).as_vec2().to_array(), kernel);
+            for bit in 0..bits {
+                design[(i, bit)] = 0.5 * gain * f64::from(sums[bit]);
             }
             design[(i, bits)] = LEVEL_ERROR;
             let off_middle = point - self.kind.middle();
@@ -391,32 +419,37 @@ impl Mixing {
     }
 
     fn means(&self, off_middle: &[f32]) -> Vec<f32> {
-        /// Number of independent sums, which do not wait for each other.
-        const EIGHT: usize = 8;
-        let of_bit = |gain: &Vec<f32>| {
-            let mut lanes = [0.0f32; EIGHT];
-            let (whole, rest) = (gain.chunks_exact(EIGHT), gain.len() / EIGHT * EIGHT);
-            for (gain, off) in whole.zip(off_middle.chunks_exact(EIGHT)) {
-                for k in 0..EIGHT {
-                    lanes[k] += gain[k] * off[k];
-                }
-            }
-            let rest = gain[rest..].iter().zip(&off_middle[rest..]).map(|(g, o)| g * o);
-            lanes.iter().sum::<f32>() + rest.sum::<f32>()
-        };
-        self.gain[..self.bits].iter().map(of_bit).collect()
+        self.gain[..self.bits].iter().map(|gain| dot(gain, off_middle)).collect()
     }
 }
 
-/// Returns the weight of a Gaussian blur at a squared distance in σ, relative to that in the centre.
-fn near(distance2: f64) -> f64 {
-    if distance2 < FAR_SIGMAS2 { (-0.5 * distance2).exp() } else { 0.0 }
+/// Returns the sum of the kernel at the parts of each cell, by bit, for a sample at this position in bit-widths.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn sums_by_cell(parts: &[Part], [u, v]: [f32; 2], kernel: Kernel) -> [f32; MAX_CELLS] {
+    let Kernel { inverse: [uu, uv, vv], along: [along_u, along_v], reach } = kernel;
+    let mut sums = [0.0; MAX_CELLS];
+    for part in parts {
+        for ((sum, part_u), part_v) in sums.iter_mut().zip(&part.u).zip(&part.v) {
+            let (du, dv) = (u - part_u, v - part_v);
+            let square = uu * du * du + 2.0 * uv * du * dv + vv * dv * dv;
+            *sum += if reach == 0.0 {
+                exp_negative(-0.5 * square)
+            } else {
+                let along = along_u * du + along_v * dv;
+                let across = (square - along * along).max(0.0);
+                exp_negative(-0.5 * across) * mean_bell(along, reach)
+            };
+        }
+    }
+    sums
 }
 
 /// Returns the mean of exp(−x²/2) over `reach` on each side.
-fn mean_bell(x: f64, reach: f64) -> f64 {
-    let [ahead, behind] = [x + reach, x - reach].map(|x| f64::from(erf_sqrt_half(x as f32)));
-    (std::f64::consts::PI / 2.0).sqrt() * (ahead - behind) / (2.0 * reach)
+#[inline(always)]
+fn mean_bell(x: f32, reach: f32) -> f32 {
+    /// √(π/2)/2.
+    const SCALE: f32 = 0.626_657_07;
+    SCALE * (erf_sqrt_half(x + reach) - erf_sqrt_half(x - reach)) / reach
 }
 
 /// Returns the mean of a normal distribution truncated below at `least`.

@@ -370,7 +370,7 @@ pub(crate) fn erf_sqrt_half(h: f32) -> f32 {
 /// exp(x) for x ≤ 0, with a relative error of 3·10⁻⁷. The result is limited to 2⁻⁶⁰, so that no product of two is a
 /// subnormal number, which processors handle slowly.
 #[inline(always)]
-pub(super) fn exp_negative(x: f32) -> f32 {
+pub(crate) fn exp_negative(x: f32) -> f32 {
     /// 1.5·2²³: adding it rounds to an integer, which then fills the low bits.
     const ROUND: f32 = 12_582_912.0;
     let y = (x * LOG2_E).max(-60.0);

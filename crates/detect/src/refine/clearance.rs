@@ -203,22 +203,28 @@ impl Surroundings {
     /// Returns a predicate for positions, px from the corner: whether no tag is visible there with this margin; or only
     /// its border, if `with_borders`.
     pub(crate) fn off_tags(&self, margin: Margin, with_borders: bool) -> impl Fn(DVec2) -> bool {
-        let areas = if with_borders { &self.cells } else { &self.tags };
-        let circle2 = clear_of(areas, DVec2::ZERO, margin).max(0.0).powi(2);
-        move |place| place.length_squared() < circle2 || clear_of(areas, place, margin) >= 0.0
+        let areas = grown(if with_borders { &self.cells } else { &self.tags }, margin);
+        let circle2 = clear_of(&areas, DVec2::ZERO).max(0.0).powi(2);
+        move |place| place.length_squared() < circle2 || clear_of(&areas, place) >= 0.0
     }
 
     /// Returns half the side of the largest clear square around the corner, px, with this margin.
     pub(crate) fn clear_square_px(&self, margin: Margin) -> f64 {
         let nearest = self.sides.iter().map(|side| side[2] - margin.from(side)).reduce(f64::min);
-        let clear = nearest.unwrap_or(0.0).min(clear_of(&self.tags, DVec2::ZERO, margin));
+        let clear = nearest.unwrap_or(0.0).min(clear_of(&grown(&self.tags, margin), DVec2::ZERO));
         clear.max(0.0) * std::f64::consts::FRAC_1_SQRT_2
     }
 }
 
-/// Returns a lower bound of the distance from a point to the nearest of some areas with this margin, px.
-fn clear_of(areas: &[Vec<Line>], DVec2 { x: u, y: v }: DVec2, margin: Margin) -> f64 {
-    let from = |side: &Line| side[0] * u + side[1] * v + side[2] - margin.from(side);
+/// Returns areas with this margin around them.
+fn grown(areas: &[Vec<Line>], margin: Margin) -> Vec<Vec<Line>> {
+    let moved = |side: &Line| [side[0], side[1], side[2] - margin.from(side)];
+    areas.iter().map(|area| area.iter().map(moved).collect()).collect()
+}
+
+/// Returns a lower bound of the distance from a point to the nearest of some areas, px.
+fn clear_of(areas: &[Vec<Line>], DVec2 { x: u, y: v }: DVec2) -> f64 {
+    let from = |side: &Line| side[0] * u + side[1] * v + side[2];
     let outside = |area: &Vec<Line>| area.iter().map(from).fold(f64::NEG_INFINITY, f64::max);
     areas.iter().map(outside).fold(f64::INFINITY, f64::min)
 }
