@@ -4,21 +4,17 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::SpeedError;
 use crate::photographs::photograph::take;
 use crate::photographs::scene::{Background, Scene};
 use crate::photographs::world::background::Studio;
-use crate::photographs::{Kind, Subject};
+use crate::photographs::Subject;
 use deltille::raster::Gray;
 
 /// Width and height, px.
 const SIZE: [usize; 2] = [1600, 1200];
 
 /// Number of photographs of a kind.
-const PHOTOGRAPHS: u64 = 2;
-
-/// Size of a bit of the tags of a board that is too far away, px: its tiles are smaller than a pixel.
-const FAR_BIT_PX: f64 = 0.08;
+const PHOTOGRAPHS: u64 = 3;
 
 /// Motion of a video, px per frame.
 const MOTION_PX: [usize; 2] = [8, 5];
@@ -38,15 +34,13 @@ pub(super) fn boards(subject: &Subject, bit_px: f64, seed: u64) -> Vec<Gray<u8>>
     photographs(subject, &scene, seed)
 }
 
-/// Returns photographs of a table, with texture and with objects, on which a board lies that is too far away.
-pub(super) fn tables(seed: u64) -> Result<[Set; 2], SpeedError> {
-    let board = Subject::of_kind(Kind { tagged: false, ..Kind::ALL[0] }, None)?;
+/// Returns photographs of a board in each kind of surroundings.
+pub(super) fn surroundings(subject: &Subject, seed: u64) -> [Set; 2] {
     let of = |background| {
-        let scene = Scene { size_px: SIZE, bit_px: FAR_BIT_PX, background, ..Scene::default() };
-        photographs(&board, &scene, seed)
+        photographs(subject, &Scene { size_px: SIZE, background, ..Scene::default() }, seed)
     };
     let sets = [("texture", Background::Texture), ("objects", Background::Clutter)];
-    Ok(sets.map(|(name, background)| Set { name: name.to_owned(), images: of(background) }))
+    sets.map(|(name, background)| Set { name: name.to_owned(), images: of(background) })
 }
 
 fn photographs(subject: &Subject, scene: &Scene, seed: u64) -> Vec<Gray<u8>> {

@@ -48,16 +48,27 @@ pub(super) fn video(seed: u64) -> Result<Vec<Row>, SpeedError> {
     Ok(vec![single, Row::new("video, followed", &ms, result)])
 }
 
-/// Search for boards that are not there.
+/// Search for boards that are not there, in photographs of boards of the other tiling and in patterns.
 pub(super) fn absent(seed: u64) -> Result<Vec<Row>, SpeedError> {
+    let patterns = images::patterns(seed);
+    let kinds = Kind::ALL.into_iter().filter(|kind| kind.tagged);
+    let boards: Result<Vec<(Kind, [images::Set; 2])>, SpeedError> =
+        kinds.map(|kind| Ok((kind, images::surroundings(&subject(kind)?, seed)))).collect();
+    let boards = boards?;
     let mut rows = Vec::new();
-    let sets = images::tables(seed)?.into_iter().chain(images::patterns(seed));
-    let sets: Vec<images::Set> = sets.collect();
     for kind in Kind::ALL {
         let detector = detector(kind)?;
-        for set in &sets {
-            let what = format!("{} absent, {}", kind.name(), set.name);
-            rows.push(detection(what, &set.images, &detector));
+        let others = boards.iter().filter(|(other, _)| other.grid != kind.grid);
+        let others = others.flat_map(|(other, sets)| {
+            sets.iter().map(move |set| (format!("{}, {}", other.name(), set.name), set))
+        });
+        let patterns = patterns.iter().map(|set| (set.name.clone(), set));
+        for (shown, set) in others.chain(patterns) {
+            rows.push(detection(
+                format!("{} absent: {shown}", kind.name()),
+                &set.images,
+                &detector,
+            ));
         }
     }
     Ok(rows)
