@@ -2,6 +2,8 @@
 //!
 //! EXIF is not needed to read the pixels, so metadata that are damaged or beyond the limits are ignored.
 
+use std::io::{BufRead, Seek};
+
 use deltille_core::quantity::nominal_focal_mm;
 use deltille_core::raster::CameraNotes;
 use exif::{Exif, In, Reader, Tag, Value};
@@ -19,22 +21,30 @@ pub(crate) fn camera(exif: Vec<u8>) -> Option<CameraNotes> {
     if exif.len() > MAX_BYTES {
         return None;
     }
-    limits::caught(|| parsed(exif)).ok().flatten().filter(|camera| !camera.is_empty())
+    parsed(|reader| reader.read_raw(exif))
 }
 
-fn parsed(exif: Vec<u8>) -> Option<CameraNotes> {
-    let mut reader = Reader::new();
-    // One wrong entry, as of some editors, does not affect the others.
-    let read = reader.continue_on_error(true).read_raw(exif);
-    let exif = read.or_else(|error| error.distill_partial_result(|_| ())).ok()?;
-    Some(CameraNotes {
-        make: text(&exif, Tag::Make),
-        model: text(&exif, Tag::Model),
-        serial: text(&exif, Tag::BodySerialNumber),
-        lens: text(&exif, Tag::LensModel),
-        focal_mm: focal_mm(&exif, Tag::FocalLength),
-        focal_35mm_mm: focal_mm(&exif, Tag::FocalLengthIn35mmFilm),
-    })
+/// Returns the camera that a HEIC file names; `None` if it does not name any.
+pub(crate) fn camera_of_heic(mut file: impl BufRead + Seek) -> Option<CameraNotes> {
+    parsed(|reader| reader.read_from_container(&mut file))
+}
+
+fn parsed(read: impl FnOnce(&Reader) -> Result<Exif, exif::Error>) -> Option<CameraNotes> {
+    let camera = limits::caught(|| {
+        // One wrong entry, as of some editors, does not affect the others.
+        let mut reader = Reader::new();
+        let read = read(reader.continue_on_error(true));
+        let exif = read.or_else(|error| error.distill_partial_result(|_| ())).ok()?;
+        Some(CameraNotes {
+            make: text(&exif, Tag::Make),
+            model: text(&exif, Tag::Model),
+            serial: text(&exif, Tag::BodySerialNumber),
+            lens: text(&exif, Tag::LensModel),
+            focal_mm: focal_mm(&exif, Tag::FocalLength),
+            focal_35mm_mm: focal_mm(&exif, Tag::FocalLengthIn35mmFilm),
+        })
+    });
+    camera.ok().flatten().filter(|camera| !camera.is_empty())
 }
 
 /// Returns a text in one line without control characters; `None` if nothing is left.
@@ -60,6 +70,8 @@ fn focal_mm(exif: &Exif, tag: Tag) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Cursor;
+
     use super::*;
 
     /// EXIF of piexif 1.1.3: `piexif.dump` of make, model, focal lengths, serial number and lens.
@@ -67,6 +79,9 @@ mod tests {
 
     /// EXIF of Pillow 13.0.0, which writes the focal length as a double.
     const PILLOW: &[u8] = b"MM\0*\0\0\0\x08\0\x03\x01\x0f\0\x02\0\0\0\x06\0\0\x002\x01\x10\0\x02\0\0\0\x0e\0\0\08\x87i\0\x04\0\0\0\x01\0\0\0F\0\0\0\0Apple\0iPhone 15 Pro\0\0\x03\x92\n\0\x0c\0\0\0\x01\0\0\0p\xa4\x05\0\x03\0\0\0\x01\0\x18\0\0\xa44\0\x02\0\0\x000\0\0\0x\0\0\0\0@\x1b\x0f\\\x1f\xf7\xa8TiPhone 15 Pro back triple camera 6.765mm f/1.78\0";
+
+    /// A photograph of 16 × 16 px by pillow-heif 1.8.1 with make and model.
+    const HEIC: &[u8] = include_bytes!("../../../tests/recordings/camera.heic");
 
     #[test]
     fn metadata_of_other_writers_are_read() {
@@ -84,6 +99,9 @@ mod tests {
         assert_eq!(phone.lens, text("iPhone 15 Pro back triple camera 6.765mm f/1.78"));
         assert_eq!(phone.focal_mm, Some(6.764_999_866));
         assert_eq!((phone.focal_35mm_mm, phone.serial), (Some(24.0), None));
+        let photograph = camera_of_heic(Cursor::new(HEIC)).unwrap();
+        assert_eq!(photograph.model, text("iPhone 15 Pro"));
+        assert_eq!(camera_of_heic(Cursor::new(&HEIC[..400])), None);
     }
 
     /// Truncated and changed metadata, and those with a huge count, are read in part or ignored.

@@ -29,7 +29,7 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 
 use crate::exif_notes;
 use crate::limits::{self, Exceeded, Limits};
-use deltille_core::raster::{AnyGray, Colours, FileNotes, Gray, Intensity};
+use deltille_core::raster::{AnyGray, CameraNotes, Colours, FileNotes, Gray, Intensity};
 use deltille_core::setting::Setting::{LimitsMaxPixels, PhotographReadWithNotes};
 
 /// Maximum size of decompressed metadata in a PNG (profiles and texts), bytes.
@@ -196,6 +196,14 @@ pub fn read_bytes(
 /// Returns an error if the file cannot be read, is not an image, is damaged, or exceeds the limits.
 pub fn read_colours(path: &Path, limits: &Limits) -> Result<DynamicImage, ImageError> {
     Ok(decoded(path, None, limits, false)?.0)
+}
+
+/// Returns the camera in the metadata of a HEIC file, whose pixels are not decoded here; `None` if they name none.
+pub fn camera_of_heic(path: &Path, limits: &Limits) -> Option<CameraNotes> {
+    limits::check_file(path).ok()?;
+    let file = File::open(path).ok()?;
+    let is_large = file.metadata().map_or(true, |metadata| metadata.len() > limits.max_bytes);
+    if is_large { None } else { exif_notes::camera_of_heic(BufReader::new(file)) }
 }
 
 /// Decodes a file, or the bytes of a file that was read before.

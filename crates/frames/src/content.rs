@@ -47,8 +47,12 @@ impl Content {
         match self {
             #[cfg(feature = "video")]
             Self::File(path) if crate::folder::is_heic(&path) => {
+                let camera = photograph::camera_of_heic(&path, limits);
+                let notes = FileNotes { camera, ..FileNotes::default() };
                 let image = crate::heic::read(&path, limits);
-                image.map(without_notes).map_err(|problem| FramesError::Recording { path, problem })
+                image
+                    .map(|image| Photograph { image, notes })
+                    .map_err(|problem| FramesError::Recording { path, problem })
             }
             Self::File(path) => Ok(photograph::read_with_notes(&path, limits, accept_damaged)?),
             Self::Gray(image) => Ok(without_notes(image)),

@@ -35,16 +35,24 @@ pub(crate) fn read(path: &Path, limits: &Limits) -> Result<AnyGray, Problem> {
         _ => return Err(refused("which this version of ffmpeg does not read")),
     };
     // Versions that do not assemble the tiles of a photograph return one of them.
-    match stated_size(&head) {
-        Some(size) if size == [image.width(), image.height()] => Ok(image),
-        _ => Err(refused("of which this version of ffmpeg reads only a part")),
+    let size = [image.width(), image.height()];
+    // ffmpeg crops to even sizes.
+    let is_whole = |stated: [usize; 2]| (0..2).all(|i| [size[i], size[i] + 1].contains(&stated[i]));
+    if stated_sizes(&head).into_iter().any(is_whole) {
+        return Ok(image);
     }
+    Err(refused("of which this version of ffmpeg reads only a part"))
 }
 
-/// Returns the largest size that a property `ispe` states: that of the photograph, not of its tiles or thumbnail.
-fn stated_size(head: &[u8]) -> Option<[usize; 2]> {
-    let sizes = head.windows(16).filter(|bytes| bytes.starts_with(b"ispe"));
+/// Returns the largest size that a property `ispe` states: that of the photograph, not of its tiles or thumbnail; and the
+/// sizes to which `clap` crops it, because encoders fill blocks at the right and at the bottom.
+fn stated_sizes(head: &[u8]) -> Vec<[usize; 2]> {
     let side = |bytes: &[u8]| bytes.iter().fold(0, |side, byte| side << 8 | usize::from(*byte));
+    let sizes = head.windows(16).filter(|bytes| bytes.starts_with(b"ispe"));
     let sizes = sizes.map(|bytes| [side(&bytes[8..12]), side(&bytes[12..16])]);
-    sizes.max_by_key(|[width, height]| width * height)
+    let cropped = head.windows(20).filter(|bytes| bytes.starts_with(b"clap")).map(|bytes| {
+        // Numerators and denominators of the width and of the height.
+        [4, 12].map(|at| side(&bytes[at..at + 4]) / side(&bytes[at + 4..at + 8]).max(1))
+    });
+    sizes.max_by_key(|[width, height]| width * height).into_iter().chain(cropped).collect()
 }

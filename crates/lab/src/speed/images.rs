@@ -4,10 +4,10 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use crate::photographs::Subject;
 use crate::photographs::photograph::take;
 use crate::photographs::scene::{Background, Scene};
 use crate::photographs::world::background::Studio;
-use crate::photographs::Subject;
 use deltille::raster::Gray;
 
 /// Width and height, px.
