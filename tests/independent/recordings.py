@@ -35,7 +35,7 @@ STEP_NS = 33_366_667
 ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
 IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 BAYER = ("rggb", "grbg", "gbrg", "bggr")
-RAW = ["mono8", "mono16", "rgb8", "bgr8", "rgba8", "bgra8", *(f"bayer_{order}{bits}" for order in BAYER for bits in (8, 16))]
+RAW = ["mono8", "8UC1", "mono16", "rgb8", "bgr8", "rgba8", "bgra8", "yuv422", "yuv422_yuy2", *(f"bayer_{order}{bits}" for order in BAYER for bits in (8, 16))]
 
 
 def run(*command, expect=0):
@@ -62,6 +62,9 @@ def coloured(frame, encoding):
         return np.repeat(frame[..., None], 3, 2)
     if encoding in ("rgba8", "bgra8"):
         return np.dstack([np.repeat(frame[..., None], 3, 2), np.full_like(frame, 9)])
+    if encoding.startswith("yuv422"):
+        planes = [np.full_like(frame, 128), frame]
+        return np.dstack(planes[::-1] if encoding.endswith("yuy2") else planes)
     return deep if encoding.endswith("16") else frame
 
 

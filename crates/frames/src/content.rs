@@ -5,10 +5,19 @@ use std::path::{Path, PathBuf};
 use deltille_core::raster::{AnyGray, FileNotes};
 use deltille_files::limits::Limits;
 use deltille_files::photograph::{self, Photograph};
+use image::{DynamicImage, GrayImage, ImageBuffer, Luma};
 
 #[cfg(any(feature = "mcap", feature = "rosbag1"))]
 use crate::pixels::RawImage;
 use crate::problem::FramesError;
+
+/// A frame of a recording.
+pub(crate) struct Recorded {
+    pub(crate) time_ns: Option<i64>,
+    /// Fraction of the recording up to this frame, if it is known.
+    pub(crate) part: Option<f64>,
+    pub(crate) content: Content,
+}
 
 /// The content of a frame.
 #[allow(dead_code, reason = "depends on the features")]
@@ -34,6 +43,33 @@ impl Content {
             #[cfg(any(feature = "mcap", feature = "rosbag1"))]
             Self::Raw(image) => Some(image.pixels()),
         }
+    }
+
+    /// Decodes the image with its colours, if it is a photograph that is not HEIC.
+    pub(crate) fn read_colours(
+        self,
+        path: &Path,
+        limits: &Limits,
+    ) -> Result<DynamicImage, FramesError> {
+        if let Self::File(path) = &self
+            && !crate::folder::is_heic(path)
+        {
+            return Ok(photograph::read_colours(path, limits)?);
+        }
+        const WHOLE: &str = "width · height samples";
+        let photograph = self.read(path, limits, false)?;
+        let size = [photograph.image.width(), photograph.image.height()];
+        let [width, height] = size.map(|side| side as u32);
+        Ok(match photograph.image {
+            AnyGray::U8(image) => {
+                GrayImage::from_raw(width, height, image.pixels().to_vec()).expect(WHOLE).into()
+            }
+            AnyGray::U16(image) => {
+                let image =
+                    ImageBuffer::<Luma<u16>, _>::from_raw(width, height, image.pixels().to_vec());
+                image.expect(WHOLE).into()
+            }
+        })
     }
 
     /// Decodes the image; errors name `path`.

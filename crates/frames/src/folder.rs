@@ -28,7 +28,6 @@ pub(crate) fn extension(path: &Path) -> String {
 }
 
 /// Whether a file is a HEIC photograph.
-#[cfg(feature = "video")]
 pub(crate) fn is_heic(path: &Path) -> bool {
     ["heic", "heif", "hif"].contains(&extension(path).as_str())
 }
@@ -36,6 +35,11 @@ pub(crate) fn is_heic(path: &Path) -> bool {
 /// Whether a path has the extension of a photograph.
 pub fn is_photograph(path: &Path) -> bool {
     PHOTOGRAPHS.contains(&extension(path).as_str())
+}
+
+/// Whether a file is a video.
+pub(crate) fn is_video(path: &Path) -> bool {
+    VIDEOS.contains(&extension(path).as_str()) && !path.is_dir()
 }
 
 /// Whether a path is a video, a recording of a robot, or the folder of one.

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use deltille_files::limits::Limits;
 use deltille_files::photograph::Photograph;
+use image::DynamicImage;
 
-use crate::content::Content;
+use crate::content::{Content, Recorded};
 use crate::problem::FramesError;
 
 /// A photograph, or a frame of a recording.
@@ -18,19 +19,14 @@ pub struct Frame {
 }
 
 impl Frame {
-    pub(crate) fn new(path: PathBuf, time_ns: Option<i64>, content: Content) -> Self {
-        Self { path, time_ns, part: None, content }
-    }
-
-    /// Sets the duration of the recording, ns; 0 if it is not known.
-    pub(crate) fn of_recording(self, duration_ns: i64) -> Self {
-        let part = |time: i64| (time as f64 / duration_ns as f64).clamp(0.0, 1.0);
-        Self { part: self.time_ns.filter(|_| duration_ns > 0).map(part), ..self }
+    pub(crate) fn recorded(path: PathBuf, recorded: Recorded) -> Self {
+        let Recorded { time_ns, part, content } = recorded;
+        Self { path, time_ns, part, content }
     }
 
     /// A photograph in a file. The file is opened by [`read`](Self::read).
     pub fn photograph(path: PathBuf) -> Self {
-        Self::new(path.clone(), None, Content::File(path))
+        Self { path: path.clone(), time_ns: None, part: None, content: Content::File(path) }
     }
 
     /// Returns the path of a photograph. A frame of a recording has the path of the recording, with its stem and the
@@ -60,7 +56,7 @@ impl Frame {
         self.time_ns
     }
 
-    /// Returns the fraction of the recording up to this frame, for videos whose duration is known.
+    /// Returns the fraction of the recording up to this frame, of its duration or of its bytes, if it is known.
     pub fn part(&self) -> Option<f64> {
         self.part
     }
@@ -68,6 +64,14 @@ impl Frame {
     /// Returns the number of pixels, if it is known without decoding.
     pub fn pixels(&self, limits: &Limits) -> Option<u64> {
         self.content.pixels(limits)
+    }
+
+    /// Decodes the image with its colours, if it is a photograph other than HEIC; frames of recordings are grey.
+    ///
+    /// # Errors
+    /// Returns an error if the image cannot be read or exceeds the limits.
+    pub fn read_colours(self, limits: &Limits) -> Result<DynamicImage, FramesError> {
+        self.content.read_colours(&self.path, limits)
     }
 
     /// Decodes the image. A damaged JPEG is refused unless `accept_damaged` is set.

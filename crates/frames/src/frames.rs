@@ -1,15 +1,18 @@
 //! The frames of a path.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicI64, Ordering};
 
+use deltille_core::setting::Setting::FrameOptionsTopic;
 use deltille_files::limits::Limits;
 
+#[cfg(feature = "video")]
 use crate::content::Content;
+use crate::content::Recorded;
 use crate::folder;
 use crate::frame::Frame;
 use crate::problem::{FramesError, Problem};
+#[cfg(feature = "video")]
+use crate::video::VideoFrame;
 
 /// Which frames are read.
 #[derive(Clone, Debug, Default)]
@@ -45,17 +48,13 @@ enum Kind {
     Recording(Recording),
 }
 
-/// Time stamps, ns, and contents.
-type Stream = Box<dyn Iterator<Item = Result<(Option<i64>, Content), Problem>> + Send>;
-
-/// The duration of a recording, ns; 0 while it is not known.
-type Duration = Arc<AtomicI64>;
+/// The frames of a recording.
+type Stream = Box<dyn Iterator<Item = Result<Recorded, Problem>> + Send>;
 
 struct Recording {
     path: PathBuf,
     /// The frames; `None` after the end.
     stream: Option<Stream>,
-    duration: Duration,
     /// Number of frames so far.
     count: u64,
     every: u64,
@@ -73,11 +72,10 @@ impl Frames {
         let path = path.as_ref();
         let failed = |problem| FramesError::Recording { path: path.to_owned(), problem };
         if folder::is_recording(path) {
-            let duration = Duration::default();
-            let stream = Some(open(path, options, &duration).map_err(failed)?);
+            let stream = Some(open(path, options).map_err(failed)?);
             let &FrameOptions { every, start, stop, .. } = options;
             let (path, every) = (path.to_owned(), every.max(1));
-            let recording = Recording { path, stream, duration, count: 0, every, start, stop };
+            let recording = Recording { path, stream, count: 0, every, start, stop };
             return Ok(Self(Kind::Recording(recording)));
         }
         if !path.is_dir() {
@@ -111,12 +109,10 @@ impl Recording {
             }
             let next = self.stream.as_mut()?.next();
             match next {
-                Some(Ok((time_ns, content))) => {
+                Some(Ok(recorded)) => {
                     self.count += 1;
                     if number >= self.start && number.is_multiple_of(self.every) {
-                        let frame = Frame::new(self.path_of(number), time_ns, content);
-                        let duration = self.duration.load(Ordering::Relaxed);
-                        return Some(Ok(frame.of_recording(duration)));
+                        return Some(Ok(Frame::recorded(self.path_of(number), recorded)));
                     }
                 }
                 Some(Err(problem)) => {
@@ -145,7 +141,15 @@ impl Recording {
 }
 
 #[allow(unused_variables, reason = "depends on the features")]
-fn open(path: &Path, options: &FrameOptions, duration: &Duration) -> Result<Stream, Problem> {
+fn open(path: &Path, options: &FrameOptions) -> Result<Stream, Problem> {
+    if folder::is_video(path) && options.topic.is_some() {
+        return Err(Problem::Unsupported(format!(
+            "a video has no topics; omit {FrameOptionsTopic}"
+        )));
+    }
+    if path.metadata().is_ok_and(|about| about.is_file() && about.len() == 0) {
+        return Err(empty());
+    }
     match folder::extension(path).as_str() {
         #[cfg(any(feature = "mcap", feature = "rosbag1"))]
         "mcap" | "bag" | "active" | "db3" => {
@@ -156,29 +160,39 @@ fn open(path: &Path, options: &FrameOptions, duration: &Duration) -> Result<Stre
             crate::bag::open_folder(path, options.topic.as_deref(), &options.limits)
         }
         #[cfg(feature = "video")]
-        "y4m" => y4m(path, &options.limits, duration),
+        "y4m" => y4m(path, &options.limits),
         #[cfg(feature = "video")]
         _ => {
-            let video = crate::video::Video::open(path, true, &options.limits, duration)?;
-            Ok(Box::new(video.map(|frame| frame.map(|(time, image)| (time, Content::Gray(image))))))
+            let video = crate::video::Video::open(path, true, &options.limits)?;
+            Ok(Box::new(video.map(|frame| {
+                let VideoFrame { time_ns, part, image } = frame?;
+                Ok(Recorded { time_ns, part, content: Content::Gray(image) })
+            })))
         }
         #[allow(unreachable_patterns, reason = "depends on the features")]
         _ => Err(Problem::Unsupported("this program was built without its format".to_owned())),
     }
 }
 
+/// The problem of a recording without a single byte.
+fn empty() -> Problem {
+    Problem::Damaged("an empty file (0 bytes)".to_owned())
+}
+
 #[cfg(feature = "video")]
-fn y4m(path: &Path, limits: &Limits, duration: &Duration) -> Result<Stream, Problem> {
+fn y4m(path: &Path, limits: &Limits) -> Result<Stream, Problem> {
     let file = std::fs::File::open(path).map_err(Problem::Io)?;
     let bytes = file.metadata().map_or(0, |about| about.len());
     let Some(mut video) = crate::y4m::Y4m::open(std::io::BufReader::new(file), limits)? else {
-        return Err(Problem::Damaged("an empty file (0 bytes)".to_owned()));
+        return Err(empty());
     };
-    duration.store(video.time_ns(video.frames_in(bytes)).unwrap_or(0), Ordering::Relaxed);
-    let mut number = 0..;
+    let count = video.frames_in(bytes).max(1);
+    let mut number = 0;
     Ok(Box::new(std::iter::from_fn(move || {
         let frame = video.next_frame().transpose()?;
-        let time_ns = number.next().and_then(|number| video.time_ns(number));
-        Some(frame.map(|image| (time_ns, Content::Gray(image))))
+        let time_ns = video.time_ns(number);
+        number += 1;
+        let part = Some((number as f64 / count as f64).min(1.0));
+        Some(frame.map(|image| Recorded { time_ns, part, content: Content::Gray(image) }))
     })))
 }

@@ -3,7 +3,6 @@
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
-use std::sync::Arc;
 
 use deltille_core::raster::AnyGray;
 use deltille_files::limits::Limits;
@@ -23,14 +22,14 @@ pub(crate) fn read(path: &Path, limits: &Limits) -> Result<AnyGray, Problem> {
     let mut head = Vec::new();
     let file = File::open(path).map_err(Problem::Io)?;
     file.take(HEAD_BYTES).read_to_end(&mut head).map_err(Problem::Io)?;
-    let mut frames = match Video::open(path, false, limits, &Arc::default()) {
+    let mut frames = match Video::open(path, false, limits) {
         Err(Problem::NoFfmpeg) => {
             return Err(refused("which is read only if ffmpeg 7 or newer is installed"));
         }
         frames => frames?,
     };
     let image = match frames.next() {
-        Some(Ok((_, image))) => image,
+        Some(Ok(frame)) => frame.image,
         Some(Err(Problem::Exceeded(exceeded))) => return Err(exceeded.into()),
         _ => return Err(refused("which this version of ffmpeg does not read")),
     };

@@ -13,6 +13,7 @@
 //! | `bag` | messages of MCAP and of the bags of ROS 1 and 2 |
 //! | `folder` | photographs in a folder |
 //! | `frames` | all of these behind one iterator |
+//! | `simultaneous` | frames of several cameras that were taken at the same time |
 //!
 //! ```no_run
 //! use deltille_files::limits::Limits;
@@ -39,6 +40,7 @@ mod heic;
 #[cfg(any(feature = "mcap", feature = "rosbag1"))]
 mod pixels;
 pub mod problem;
+mod simultaneous;
 #[cfg(feature = "video")]
 mod video;
 #[cfg(feature = "video")]
@@ -48,3 +50,4 @@ pub use folder::{is_photograph, is_recording, photographs_in, unread_in};
 pub use frame::Frame;
 pub use frames::{FrameOptions, Frames};
 pub use problem::{FramesError, Problem};
+pub use simultaneous::{FrameSets, interval_ns};

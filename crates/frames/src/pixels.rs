@@ -1,7 +1,7 @@
 //! The pixels of a `sensor_msgs/Image` as grey values.
 //!
 //! Colours become grey as those of photographs do. A Bayer mosaic contains the values that the sensor measured; red and
-//! blue are brought to the level of green. Source: `sensor_msgs/image_encodings.hpp` of ROS.
+//! blue are brought to the level of green. Of YUV, luma is used, as of videos. Source: `sensor_msgs/image_encodings.hpp` of ROS.
 
 use deltille_core::raster::{AnyGray, Colours, Gray, Intensity};
 use deltille_core::words::quoted;
@@ -10,7 +10,8 @@ use deltille_files::limits::Limits;
 use crate::problem::Problem;
 
 /// The supported encodings, as part of messages.
-const SUPPORTED: &str = "mono8, mono16, rgb8, bgr8, rgba8, bgra8, bayer_*8, bayer_*16";
+const SUPPORTED: &str = "mono8, mono16, rgb8, bgr8, rgba8, bgra8, bayer_*8, bayer_*16, yuv422, yuv422_yuy2, uyvy, yuyv, nv12, nv21, \
+                         nv24, 8UC1, 16UC1";
 
 /// The image of a message.
 pub(crate) struct RawImage {
@@ -25,7 +26,8 @@ pub(crate) struct RawImage {
 
 #[derive(Clone, Copy)]
 enum Encoding {
-    Mono8,
+    /// A grey value of 8 bits: bytes of a pixel, and the position of the value among them.
+    Luma8(usize, usize),
     Mono16,
     /// Values of a pixel, of 8 bits; the index of red; and the step to green and to blue.
     Colours(usize, usize, isize),
@@ -37,8 +39,11 @@ enum Encoding {
 impl Encoding {
     fn of(name: &str) -> Option<Self> {
         Some(match name {
-            "mono8" => Self::Mono8,
-            "mono16" => Self::Mono16,
+            // The colours of nv12 and its relatives follow the plane of luma.
+            "mono8" | "8UC1" | "nv12" | "nv21" | "nv24" => Self::Luma8(1, 0),
+            "yuv422_yuy2" | "yuyv" => Self::Luma8(2, 0),
+            "yuv422" | "uyvy" => Self::Luma8(2, 1),
+            "mono16" | "16UC1" => Self::Mono16,
             "rgb8" => Self::Colours(3, 0, 1),
             "bgr8" => Self::Colours(3, 2, -1),
             "rgba8" => Self::Colours(4, 0, 1),
@@ -61,7 +66,8 @@ impl Encoding {
 
     fn bytes_per_pixel(self) -> usize {
         match self {
-            Self::Mono8 | Self::Bayer8(_) => 1,
+            Self::Luma8(bytes, _) => bytes,
+            Self::Bayer8(_) => 1,
             Self::Mono16 | Self::Bayer16(_) => 2,
             Self::Colours(channels, ..) => channels,
         }
@@ -80,7 +86,10 @@ impl RawImage {
     ) -> Result<Self, Problem> {
         limits.check_pixels(width, height)?;
         let unknown = || {
-            Problem::Unsupported(format!("encoding {} (supported: {SUPPORTED})", quoted(encoding)))
+            let encoding = quoted(encoding);
+            Problem::Unsupported(format!(
+                "encoding {encoding} is not supported (known: {SUPPORTED})"
+            ))
         };
         let encoding = Encoding::of(encoding).ok_or_else(unknown)?;
         let [width, height, step] = [width, height, step].map(|number| number as usize);
@@ -104,14 +113,20 @@ impl RawImage {
     pub(crate) fn grey(&self) -> Result<AnyGray, Problem> {
         let (width, height) = (self.width, self.height);
         let grey = match self.encoding {
-            Encoding::Mono8 => Gray::from_vec(width, height, self.bytes()).map(AnyGray::U8),
+            Encoding::Luma8(bytes, place) => {
+                let values = self.rows().flat_map(|row| row.iter().skip(place).step_by(bytes));
+                Gray::from_vec(width, height, values.copied().collect()).map(AnyGray::U8)
+            }
             Encoding::Mono16 => Gray::from_vec(width, height, self.words()).map(AnyGray::U16),
             Encoding::Colours(channels, red, along) => {
                 let strides = [self.step.cast_signed(), channels.cast_signed(), along];
                 let colours = Colours::with_strides(width, height, red, strides, &self.data);
                 colours.map(|colours| AnyGray::U8(colours.grey()))
             }
-            Encoding::Bayer8(red) => self.of_mosaic(&self.bytes(), red).map(AnyGray::U8),
+            Encoding::Bayer8(red) => {
+                let values: Vec<u8> = self.rows().flatten().copied().collect();
+                self.of_mosaic(&values, red).map(AnyGray::U8)
+            }
             Encoding::Bayer16(red) => self.of_mosaic(&self.words(), red).map(AnyGray::U16),
         };
         grey.ok_or_else(Problem::cut_off)
@@ -121,10 +136,6 @@ impl RawImage {
     fn rows(&self) -> impl Iterator<Item = &[u8]> {
         let row = self.width * self.encoding.bytes_per_pixel();
         (0..self.height).map(move |y| &self.data[y * self.step..][..row])
-    }
-
-    fn bytes(&self) -> Vec<u8> {
-        self.rows().flatten().copied().collect()
     }
 
     fn words(&self) -> Vec<u16> {
@@ -172,6 +183,9 @@ mod tests {
         };
         let expected = AnyGray::U8(Gray::from_vec(2, 2, vec![1, 2, 3, 4]).unwrap());
         assert_eq!(grey("mono8", 3, &[1, 2, 0, 3, 4]), expected);
+        assert_eq!(grey("yuyv", 5, &[1, 9, 2, 9, 0, 3, 9, 4, 9]), expected);
+        assert_eq!(grey("uyvy", 4, &[9, 1, 9, 2, 9, 3, 9, 4]), expected);
+        assert_eq!(grey("nv12", 2, &[1, 2, 3, 4, 9, 9]), expected);
         assert_eq!(
             grey("bgra8", 9, &[1, 1, 1, 0, 2, 2, 2, 0, 9, 3, 3, 3, 0, 4, 4, 4, 0]),
             expected

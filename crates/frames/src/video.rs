@@ -25,28 +25,35 @@ const FFMPEG: &str = "ffmpeg";
 const OLD_VERSIONS: [&str; 4] =
     ["ffmpeg version 3.", "ffmpeg version 4.", "ffmpeg version n4.", "ffmpeg version 5.0"];
 
+/// What ffmpeg states about a frame: its time stamp, ns, and its width and height, px.
+type Stated = (Option<i64>, Option<[usize; 2]>);
+
+/// A decoded frame.
+pub(crate) struct VideoFrame {
+    pub(crate) time_ns: Option<i64>,
+    /// Fraction of the video up to this frame, if its duration is known.
+    pub(crate) part: Option<f64>,
+    pub(crate) image: AnyGray,
+}
+
 /// The frames of a video.
 pub(crate) struct Video {
     child: Child,
     /// The frames, until the end.
     frames: Option<Y4m<BufReader<ChildStdout>>>,
-    /// Time stamps in the order of the frames, ns.
-    times: Receiver<Option<i64>>,
+    /// Time stamps in the order of the frames, ns, and sizes, px.
+    stated: Receiver<Stated>,
     /// Reads the log, and returns the first error.
     log: Option<JoinHandle<Option<String>>>,
+    /// Duration, ns; 0 while it is not known.
+    duration_ns: Arc<AtomicI64>,
     limits: Limits,
     has_ended: bool,
 }
 
 impl Video {
-    /// Starts ffmpeg. With `is_rotated`, frames are rotated as the metadata states. Sets the duration, ns, as soon as it is
-    /// known.
-    pub(crate) fn open(
-        path: &Path,
-        is_rotated: bool,
-        limits: &Limits,
-        duration: &Arc<AtomicI64>,
-    ) -> Result<Self, Problem> {
+    /// Starts ffmpeg. With `is_rotated`, frames are rotated as the metadata states.
+    pub(crate) fn open(path: &Path, is_rotated: bool, limits: &Limits) -> Result<Self, Problem> {
         // A missing file is not a problem of ffmpeg.
         std::fs::File::open(path).map_err(Problem::Io)?;
         let mut file = std::ffi::OsString::from("file:");
@@ -67,20 +74,33 @@ impl Video {
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = command.spawn().map_err(not_started)?;
-        let (sender, times) = channel();
-        let duration = Arc::clone(duration);
+        let (sender, stated) = channel();
+        let duration_ns = Arc::new(AtomicI64::new(0));
+        let duration = Arc::clone(&duration_ns);
         let read = move |log| thread::spawn(move || read_log(log, &sender, &duration));
         let log = child.stderr.take().map(read);
-        Ok(Self { child, frames: None, times, log, limits: *limits, has_ended: false })
+        let limits = *limits;
+        Ok(Self { child, frames: None, stated, log, duration_ns, limits, has_ended: false })
     }
 
-    fn next_frame(&mut self) -> Result<Option<(Option<i64>, AnyGray)>, Problem> {
+    fn next_frame(&mut self) -> Result<Option<VideoFrame>, Problem> {
         if let Some(pipe) = self.child.stdout.take() {
             self.frames = Y4m::open(BufReader::new(pipe), &self.limits)?;
         }
         let Some(frames) = &mut self.frames else { return Ok(None) };
         let Some(image) = frames.next_frame()? else { return Ok(None) };
-        Ok(Some((self.times.recv().ok().flatten(), image)))
+        let (time_ns, size) = self.stated.recv().unwrap_or_default();
+        // ffmpeg scales all frames to the size of the first.
+        let [width, height] = [image.width(), image.height()];
+        if let Some([other_width, other_height]) = size.filter(|size| *size != [width, height]) {
+            return Err(Problem::Unsupported(format!(
+                "the size of the frames changes from {width} × {height} to {other_width} × {other_height} px; split the video"
+            )));
+        }
+        let duration = self.duration_ns.load(Ordering::Relaxed);
+        let part = |time: i64| (time as f64 / duration as f64).clamp(0.0, 1.0);
+        let part = time_ns.filter(|_| duration > 0).map(part);
+        Ok(Some(VideoFrame { time_ns, part, image }))
     }
 
     /// Returns the error of ffmpeg after the last frame, if there is one.
@@ -97,7 +117,7 @@ impl Video {
 }
 
 impl Iterator for Video {
-    type Item = Result<(Option<i64>, AnyGray), Problem>;
+    type Item = Result<VideoFrame, Problem>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.has_ended {
@@ -138,8 +158,8 @@ fn not_started(error: std::io::Error) -> Problem {
     }
 }
 
-/// Sends the time stamp of each frame, sets the duration, and returns the first error.
-fn read_log(log: ChildStderr, times: &Sender<Option<i64>>, duration: &AtomicI64) -> Option<String> {
+/// Sends the time stamp and size of each frame, sets the duration, and returns the first error.
+fn read_log(log: ChildStderr, stated: &Sender<Stated>, duration: &AtomicI64) -> Option<String> {
     let (mut time_base, mut error) = (None, None);
     for line in BufReader::new(log).split(b'\n').map_while(Result::ok) {
         let line = String::from_utf8_lossy(&line);
@@ -148,8 +168,9 @@ fn read_log(log: ChildStderr, times: &Sender<Option<i64>>, duration: &AtomicI64)
             time_base = after(line, "config in time_base: ").and_then(ratio).or(time_base);
             if let Some(stamp) = after(line, " pts:") {
                 let time = stamp.parse().ok().zip(time_base);
+                let time_ns = time.and_then(|(pts, base)| in_ns(pts, base));
                 // The reader may have stopped.
-                let _ = times.send(time.and_then(|(pts, base)| in_ns(pts, base)));
+                let _ = stated.send((time_ns, after(line, " s:").and_then(size)));
             }
         } else if let Some(ns) = after(line, "  Duration: ").and_then(clock_ns) {
             duration.store(ns, Ordering::Relaxed);
@@ -172,6 +193,12 @@ fn after<'a>(line: &'a str, mark: &str) -> Option<&'a str> {
 fn ratio(text: &str) -> Option<[i64; 2]> {
     let (seconds, parts) = text.trim_end_matches(',').split_once('/')?;
     Some([seconds.parse().ok()?, parts.parse().ok().filter(|parts| *parts > 0)?])
+}
+
+/// Parses a size such as `640x480`.
+fn size(text: &str) -> Option<[usize; 2]> {
+    let (width, height) = text.split_once('x')?;
+    Some([width.parse().ok()?, height.parse().ok()?])
 }
 
 /// Parses a duration such as `00:01:02.50,`, ns.
@@ -199,6 +226,7 @@ mod tests {
         assert_eq!(in_ns(1, base), Some(33_366_666));
         assert_eq!(clock_ns("00:01:02.50,"), Some(62_500_000_000));
         assert_eq!(clock_ns("N/A,"), None);
+        assert_eq!(size("640x480"), Some([640, 480]));
         assert_eq!(after("[x] n:   1 pts:   1001 pts_time:0.03", " pts:"), Some("1001"));
     }
 }

@@ -164,7 +164,8 @@ impl Records {
                     let time_ns = i64::try_from(logged).ok();
                     let mut data = content;
                     data.drain(..start);
-                    return Ok(Some((channel, Message { time_ns, data })));
+                    let part = self.source.part();
+                    return Ok(Some((channel, Message { time_ns, part, data })));
                 }
             }
         }

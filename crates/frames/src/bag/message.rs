@@ -22,6 +22,8 @@ use crate::problem::Problem;
 pub(crate) struct Message {
     /// Time of the recording, ns.
     pub(crate) time_ns: Option<i64>,
+    /// Fraction of the file up to this message.
+    pub(crate) part: f64,
     pub(crate) data: Vec<u8>,
 }
 

@@ -27,11 +27,11 @@ use deltille_files::limits::Limits;
 
 use self::message::Message;
 use self::topic::{Topic, choose};
-use crate::content::Content;
+use crate::content::Recorded;
 use crate::problem::Problem;
 
-/// Time stamps, ns, and images.
-type Images = Box<dyn Iterator<Item = Result<(Option<i64>, Content), Problem>> + Send>;
+/// The images of a topic.
+type Images = Box<dyn Iterator<Item = Result<Recorded, Problem>> + Send>;
 
 /// Messages of a topic in a file.
 type Messages = Box<dyn Iterator<Item = Result<Message, Problem>> + Send>;
@@ -61,14 +61,23 @@ pub(crate) fn open_folder(
     }
     let (topic, limits) = (choose(all, wanted)?, *limits);
     let of_topic = topic.clone();
+    let bytes = |file: &std::path::PathBuf| std::fs::metadata(file).map_or(0, |about| about.len());
+    let all: u64 = files.iter().map(bytes).sum();
+    let mut before = 0;
     let messages = files.into_iter().flat_map(move |file| {
-        messages(&file, &of_topic, &limits)
-            .unwrap_or_else(|problem| Box::new(std::iter::once(Err(problem))))
+        let (start, own) = (before, bytes(&file));
+        before += own;
+        let messages = messages(&file, &of_topic, &limits)
+            .unwrap_or_else(|problem| Box::new(std::iter::once(Err(problem))));
+        messages.map(move |message| {
+            let part = |part| (start as f64 + part * own as f64) / all.max(1) as f64;
+            message.map(|message| Message { part: part(message.part), ..message })
+        })
     });
     let messages = messages.map(move |message| match message {
-        Ok(Message { time_ns, data }) if is_compressed => {
-            let data = source::decompressed("zstd", &data, None, &limits)?;
-            Ok(Message { time_ns, data })
+        Ok(message) if is_compressed => {
+            let data = source::decompressed("zstd", &message.data, None, &limits)?;
+            Ok(Message { data, ..message })
         }
         message => message,
     });
@@ -78,9 +87,9 @@ pub(crate) fn open_folder(
 /// Reads the images of messages.
 fn images(messages: Messages, topic: Topic, limits: Limits) -> Images {
     Box::new(messages.map(move |message| {
-        let Message { time_ns, data } = message?;
-        let (stamp, image) = message::image(data, topic.kind(), topic.dialect, &limits)?;
-        Ok((stamp.or(time_ns), image))
+        let Message { time_ns, part, data } = message?;
+        let (stamp, content) = message::image(data, topic.kind(), topic.dialect, &limits)?;
+        Ok(Recorded { time_ns: stamp.or(time_ns), part: Some(part), content })
     }))
 }
 

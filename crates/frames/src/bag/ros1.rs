@@ -134,7 +134,8 @@ impl Records {
                     let [seconds, ns] = [time.u32()?, time.u32()?].map(i64::from);
                     let time_ns = Some(seconds * 1_000_000_000 + ns);
                     let data = self.source.bytes(length.into())?;
-                    return Ok(Some((number("conn")?, Message { time_ns, data })));
+                    let part = self.source.part();
+                    return Ok(Some((number("conn")?, Message { time_ns, part, data })));
                 }
                 CHUNK => {
                     let compression = text(field(&header, "compression")?);

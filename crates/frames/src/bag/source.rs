@@ -37,6 +37,11 @@ impl Source {
         self.length
     }
 
+    /// Returns the fraction of the file that was read, with the whole of the chunk.
+    pub(crate) fn part(&self) -> f64 {
+        1.0 - self.left as f64 / self.length.max(1) as f64
+    }
+
     /// Moves to a position in the file; stays if it is behind the end.
     pub(crate) fn seek(&mut self, position: u64) -> Result<(), Problem> {
         self.left = self.length.checked_sub(position).ok_or_else(Problem::cut_off)?;

@@ -32,13 +32,21 @@ pub(crate) struct Messages {
     topic: String,
     /// Id of the last message.
     last: i64,
+    /// Smallest and largest id of all messages.
+    ids: [i64; 2],
     has_ended: bool,
 }
 
 impl Messages {
     pub(crate) fn open(path: &Path, topic: &Topic, limits: &Limits) -> Result<Self, Problem> {
         let database = open(path, limits)?;
-        Ok(Self { database, topic: topic.name.clone(), last: i64::MIN, has_ended: false })
+        let id = |which: &str| {
+            let which = format!("SELECT {which}(id) FROM messages");
+            database.query_row(&which, [], |row| row.get::<_, Option<i64>>(0))
+        };
+        // Damage is reported when the messages are read.
+        let ids = ["min", "max"].map(|which| id(which).ok().flatten().unwrap_or(0));
+        Ok(Self { database, topic: topic.name.clone(), last: i64::MIN, ids, has_ended: false })
     }
 
     fn next_message(&mut self) -> rusqlite::Result<Option<Message>> {
@@ -47,7 +55,10 @@ impl Messages {
                     AND topic_id IN (SELECT id FROM topics WHERE name = ?2) ORDER BY id LIMIT 1";
         let mut statement = self.database.prepare(next)?;
         let row = statement.query_row(params![self.last, self.topic], |row| {
-            Ok((row.get(0)?, Message { time_ns: row.get(1)?, data: row.get(2)? }))
+            let id: i64 = row.get(0)?;
+            let [first, last] = self.ids.map(|id| id as f64);
+            let part = ((id as f64 - first + 1.0) / (last - first + 1.0)).clamp(0.0, 1.0);
+            Ok((id, Message { time_ns: row.get(1)?, part, data: row.get(2)? }))
         });
         Ok(row.optional()?.map(|(id, message)| {
             self.last = id;

@@ -170,11 +170,11 @@ fn in_folder(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let skipped = format!("{} such as {}", counted(unread.len(), "file"), first.display());
     if images.is_empty() {
         bail!(
-            "{}: no photograph that can be read, but {skipped}; recordings are given by name",
+            "{}: no photograph that can be read, but {skipped}; pass recordings by name",
             folder.display()
         );
     }
-    log!("note: {skipped} not read; recordings are given by name");
+    log!("note: {skipped} not read; pass recordings by name");
     Ok(images)
 }
 
