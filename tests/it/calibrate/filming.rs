@@ -28,6 +28,11 @@ fn folder() -> tempfile::TempDir {
 
 /// Frames of a person who holds the board at one pose after the other.
 fn frames() -> Vec<Vec<u8>> {
+    seen_from(Pose::IDENTITY)
+}
+
+/// These frames in a camera whose pose relative to the first one is given.
+fn seen_from(camera_from_first: Pose) -> Vec<Vec<u8>> {
     let target = Target::new("board", BoardSpec::deltille(5, 6, 30.0)).unwrap();
     let scene = scene_of_target(&target).unwrap();
     let [width, height] = SIZE.map(|side| side as u32);
@@ -43,6 +48,7 @@ fn frames() -> Vec<Vec<u8>> {
         let rotation = tilt * DQuat::from_rotation_x(std::f64::consts::PI);
         let centre = DVec3::new(40.0 * sin, 25.0 * cos, 330.0);
         let pose = Pose { rotation, translation: centre - rotation * middle };
+        let pose = camera_from_first.after(&pose);
         let light = Light::default().noise(0.005).seed(index as u64);
         let image = scene.render(&camera, &pose, &light).map(|grey| (255.0 * grey + 0.5) as u8);
         image.pixels().to_vec()
@@ -51,9 +57,9 @@ fn frames() -> Vec<Vec<u8>> {
 }
 
 /// Writes frames as an uncompressed video without colour.
-fn write_video(path: &Path, frames: &[Vec<u8>]) {
+fn write_video(path: &Path, rate: u32, frames: &[Vec<u8>]) {
     let mut file = fs::File::create(path).unwrap();
-    writeln!(file, "YUV4MPEG2 W{} H{} F30:1 Cmono", SIZE[0], SIZE[1]).unwrap();
+    writeln!(file, "YUV4MPEG2 W{} H{} F{rate}:1 Cmono", SIZE[0], SIZE[1]).unwrap();
     for frame in frames {
         file.write_all(b"FRAME\n").unwrap();
         file.write_all(frame).unwrap();
@@ -81,7 +87,7 @@ fn focal_is_right(found: &Value) {
 fn a_video_becomes_a_camera() {
     let folder = folder();
     let at = folder.path();
-    write_video(&at.join("film.y4m"), &frames());
+    write_video(&at.join("film.y4m"), 30, &frames());
     let said = calibrated(at, "film.y4m --model plumb_bob --views 10 -o few.yaml");
     assert!(said.contains("note: --model plumb_bob is radtan5 (radtan and k3) here"), "{said}");
     assert!(said.contains("48 frames, 48 with the target, "), "{said}");
@@ -97,6 +103,58 @@ fn a_video_becomes_a_camera() {
     // Without any option, a model is selected.
     calibrated(at, "film.y4m");
     focal_is_right(&json(&at.join("camera.json")));
+}
+
+#[test]
+fn videos_of_two_cameras_become_a_rig() {
+    let folder = folder();
+    let at = folder.path();
+    let rotation = DQuat::from_rotation_y(0.1);
+    let translation = DVec3::new(-45.0, 2.0, 3.0);
+    let right = seen_from(Pose { rotation, translation });
+    write_video(&at.join("left.y4m"), 30, &frames());
+    // The second frame of each two is missing.
+    let right: Vec<Vec<u8>> = right.into_iter().step_by(2).collect();
+    write_video(&at.join("right.y4m"), 15, &right);
+    let rig = "rig --camera left=left.y4m --camera right=right.y4m --target board.json";
+    let done = deltille(at, &format!("{rig} --views 10 --model radtan -o rig")).success();
+    let said = String::from_utf8(done.get_output().stderr.clone()).unwrap();
+    let sets = "24 sets of simultaneous images, at most 0.0 ms apart (limit 16.7 ms); 24 images of left without a partner";
+    assert!(said.contains(sets), "{said}");
+    let found = json(&at.join("rig/rig.json"));
+    assert_eq!(found["frames"].as_array().unwrap().len(), 10);
+    let motion = &found["cameras"][1]["camera_from_rig"];
+    for (axis, expected) in translation.to_array().into_iter().enumerate() {
+        let [value, sd] =
+            ["translation_mm", "translation_sd_mm"].map(|key| motion[key][axis].as_f64().unwrap());
+        assert!((value - expected).abs() < 5.0 * sd, "{motion}");
+    }
+    found["cameras"].as_array().unwrap().iter().for_each(focal_is_right);
+
+    let mut page = Page::default();
+    page.title("Recordings that are not those of a rig");
+    let sample = Path::new(crate::common::REPOSITORY).join("tests/recordings/run.mcap");
+    fs::copy(sample, at.join("run.mcap")).unwrap();
+    fs::create_dir(at.join("photos")).unwrap();
+    image::GrayImage::new(64, 64).save(at.join("photos/a.png")).unwrap();
+    for inputs in [
+        "run.mcap",
+        "run.mcap --topic /camera/image",
+        "run.mcap --topic /camera/image --topic /camera/image",
+        "run.mcap --topic /camera/image --topic /rear",
+        "run.mcap --topic ../up=/camera/image --topic /right",
+        "left.y4m",
+        "left.y4m --topic /camera/image --topic /right",
+        "--camera left=left.y4m --camera right=run.mcap",
+        "--camera left=left.y4m --camera right=run.mcap --topic /right",
+        "--camera left=left.y4m --camera right=run.mcap --topic rear=/right",
+        "--camera left=left.y4m --camera right=run.mcap --topic right=/camera/image",
+        "--camera left=left.y4m --camera right=photos",
+    ] {
+        page.refused(at, &format!("deltille rig {inputs} --target board.json -o none"));
+    }
+    assert!(!at.join("none").exists());
+    page.is("rig-filming");
 }
 
 #[test]

@@ -171,7 +171,7 @@ impl Gain {
     }
 
     /// The projection uncertainty at infinity over the image, px: RMS per axis.
-    pub(super) fn now_px(&self) -> Option<f64> {
+    pub(crate) fn now_px(&self) -> Option<f64> {
         self.px(&self.known, &self.sums)
     }
 

@@ -185,6 +185,7 @@ fn images_without_a_board_are_reported_with_the_most_common_reason() {
     let why = "no board of this kind found in 4 images; 2 of them: 1 tag not on the target, for example id 4";
     refused(folder.path(), CALIBRATE, &[why]);
     std::fs::create_dir(folder.path().join("b")).unwrap();
+    std::fs::copy(folder.path().join("corners/00.json"), folder.path().join("b/00.json")).unwrap();
     let rig = "rig --camera a=corners --camera b=b --target board.json";
     refused(folder.path(), rig, &["--camera a", why]);
 }

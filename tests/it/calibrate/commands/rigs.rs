@@ -68,7 +68,10 @@ fn a_rig_is_calibrated_from_images() {
     std::fs::write(at.join("true.yaml"), camera.to_yaml()).unwrap();
     let right = photographed(at, "ico", 5);
     let cameras = "--camera left=corners/left --camera right=corners/right";
-    done(at, &format!("rig {cameras} --target ico.json -o rig --format kalibr,colmap"));
+    done(
+        at,
+        &format!("rig {cameras} --target ico.json -o rig --model radtan --format kalibr,colmap"),
+    );
     let rig = json(&at.join("rig/rig.json"));
     assert!(rig["rms_px"].as_f64().unwrap() < 0.1, "{}", rig["rms_px"]);
     let found = motion(&rig["cameras"][1]["camera_from_rig"]);
@@ -109,7 +112,10 @@ fn a_rig_is_calibrated_from_images() {
     let first: Value = serde_json::from_str(lines.lines().next().unwrap()).unwrap();
     let [larger, planned] = [&line, &first].map(|line| motion(&line["camera_from_target"]));
     assert!((larger.translation - 1.01 * planned.translation).length() < 1e-3, "{larger:?}");
-    done(at, &format!("rig {cameras} --target ico.json -o larger --print-scale 1.01"));
+    done(
+        at,
+        &format!("rig {cameras} --target ico.json -o larger --model radtan --print-scale 1.01"),
+    );
     let larger = &json(&at.join("larger/rig.json"))["cameras"][1]["camera_from_rig"];
     let planned = motion(&rig["cameras"][1]["camera_from_rig"]).translation;
     assert!((motion(larger).translation - 1.01 * planned).length() < 1e-2, "{larger}");
@@ -122,7 +128,7 @@ fn a_rig_is_calibrated_from_images() {
     // Held-out frames, and a page with a section for each camera.
     let page = "--holdout 5 --report held --images left=left";
     std::fs::create_dir(at.join("held")).unwrap();
-    done(at, &format!("rig {cameras} --target ico.json -o held {page}"));
+    done(at, &format!("rig {cameras} --target ico.json -o held --model radtan {page}"));
     let rig = json(&at.join("held/rig.json"));
     let rms = [&rig, &rig["held_out"]].map(|of| of["rms_px"].as_f64().unwrap());
     assert!(rms.iter().all(|rms| *rms < 0.1), "{rms:?}");

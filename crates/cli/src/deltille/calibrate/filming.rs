@@ -1,10 +1,11 @@
-//! Photographs and recordings as input of a calibration.
+//! Photographs and recordings of one camera or of several as input of a calibration.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, anyhow, bail, ensure};
+use rayon::prelude::*;
 
 use crate::deltille::files::images::{Images, RecordingArgs, Stems};
 use crate::deltille::files::images_at_once;
@@ -13,9 +14,14 @@ use crate::output::log;
 use crate::progress::FrameProgress;
 use crate::run::{Interrupted, report};
 use crate::values::whole;
-use deltille::calibrate::{Calibration, Intrinsics, Keyframe, Keyframes, Reference, views};
+use deltille::calibrate::{
+    Calibration, CameraViews, Intrinsics, Keyframe, Keyframes, Reference, views,
+};
 use deltille::detect::{Detection, Detector, DetectorConfig, InkEstimate, Tracker};
-use deltille::frames::{Frame, is_photograph, is_recording, photographs_in};
+use deltille::frames::{
+    Frame, FrameOptions, FrameSets, interval_ns, is_photograph, is_recording, photographs_in,
+    unread_in,
+};
 use deltille::limits::Limits;
 use deltille_core::words::counted;
 
@@ -45,7 +51,7 @@ pub struct FilmArgs {
 /// Whether the inputs are photographs and recordings, not detections.
 pub fn are_images(inputs: &[PathBuf]) -> anyhow::Result<bool> {
     let is_image = |path: &PathBuf| match path.is_dir() && !is_recording(path) {
-        true => has_only_photographs(path),
+        true => has_only_images(path),
         false => is_recording(path) || is_photograph(path),
     };
     let (images, others): (Vec<_>, Vec<_>) = inputs.iter().partition(|path| is_image(path));
@@ -58,18 +64,19 @@ pub fn are_images(inputs: &[PathBuf]) -> anyhow::Result<bool> {
     Ok(!images.is_empty())
 }
 
-/// Whether a folder contains photographs, but no detections.
-fn has_only_photographs(folder: &Path) -> bool {
+/// Whether a folder contains photographs or recordings, but no detections.
+fn has_only_images(folder: &Path) -> bool {
     let Ok(entries) = std::fs::read_dir(folder) else { return false };
     let ends =
         |path: &Path, end: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(end));
     let mut paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
     let has_detections = paths.any(|path| ends(&path, "json") || ends(&path, "parquet"));
-    !has_detections && photographs_in(folder).is_ok_and(|photographs| !photographs.is_empty())
+    let images = [photographs_in(folder), unread_in(folder)].into_iter().flatten().flatten();
+    !has_detections && images.count() > 0
 }
 
 impl FilmArgs {
-    /// Detects the target in all frames, and returns those to calibrate with. Ctrl-C ends the reading, not the calibration.
+    /// Detects the target in all frames of a camera, and returns those to calibrate with.
     pub fn see(
         &self,
         inputs: &[PathBuf],
@@ -77,26 +84,364 @@ impl FilmArgs {
         intrinsics: &Intrinsics,
         limits: &Limits,
     ) -> anyhow::Result<Given> {
-        let images = Images::of(inputs)?;
-        let recordings = images.named().iter().filter(|path| is_recording(path)).count();
+        let options = self.recording.options(*limits);
+        let camera = FilmCamera { name: "", images: Images::of(inputs)?, options, intrinsics };
+        let film = Film { cameras: vec![camera], every: 1, views: self.views, limits };
+        let detections = film.see(reference)?.remove(0);
+        Ok(Given::of_images(detections, &inputs[0]))
+    }
+}
+
+impl Given {
+    /// Detections in images.
+    pub fn of_images(detections: Vec<(String, Detection)>, first: &Path) -> Self {
+        let files = detections.iter().map(|(name, _)| PathBuf::from(name)).collect();
+        Self { detections, files, first: first.to_owned() }
+    }
+}
+
+/// Images to detect a target in, of one camera or of several.
+pub struct Film<'a> {
+    pub cameras: Vec<FilmCamera<'a>>,
+    /// Of frames of several cameras, every n-th is used.
+    pub every: u64,
+    /// Maximum number of frames to calibrate with.
+    pub views: Option<u32>,
+    pub limits: &'a Limits,
+}
+
+/// The images of a camera.
+pub struct FilmCamera<'a> {
+    /// Name in messages; empty for a single camera.
+    pub name: &'a str,
+    pub images: Images,
+    pub options: FrameOptions,
+    pub intrinsics: &'a Intrinsics,
+}
+
+/// What was seen in all images.
+#[derive(Default)]
+struct Seen {
+    keyframes: Vec<Keyframe>,
+    /// The ink spread of every image that could be read.
+    inks: Vec<Option<InkEstimate>>,
+    errors: Vec<anyhow::Error>,
+}
+
+impl Film<'_> {
+    /// Detects the target in all images, and returns the detections of each camera to calibrate with. Ctrl-C ends the
+    /// reading, not the calibration.
+    pub fn see(&self, reference: &Reference) -> anyhow::Result<Vec<Vec<(String, Detection)>>> {
+        let named = || self.cameras.iter().flat_map(|camera| camera.images.named());
+        let recordings = named().filter(|path| is_recording(path)).count();
         ensure!(
-            recordings == 0 || recordings == images.named().len(),
+            recordings == 0 || recordings == named().count(),
             "photographs and recordings cannot be calibrated together; detect the target in each, then calibrate with all detections"
         );
-        let film = Film { args: self, images, limits, detector: detector(reference)? };
+        let detector = detector(reference)?;
         interrupt::keeps_results();
-        let (keyframes, inks) = match recordings {
-            0 => film.photographs()?,
-            _ => film.recordings()?,
-        };
-        let most = self.views.unwrap_or(if recordings > 0 { VIEWS } else { u32::MAX }) as usize;
-        let mut detections = selected(&keyframes, reference, intrinsics, most)?;
-        let again = film.detector.with_ink_of(&inks);
-        if let Some(detector) = again.filter(|_| !interrupt::has_ended_input()) {
-            film.see_again(&detector, &mut detections)?;
+        let Seen { keyframes, inks, .. } = match recordings {
+            0 => self.photographs(&detector)?,
+            _ => self.recordings(&detector)?,
         }
-        let files = detections.iter().map(|(name, _)| PathBuf::from(name)).collect();
-        Ok(Given { detections, files, first: inputs[0].clone() })
+        .ended()?;
+        let most = self.views.or((recordings > 0).then_some(VIEWS));
+        let mut selected = self.selected(keyframes, reference, most)?;
+        let again = detector.with_ink_of(&inks);
+        if let Some(detector) = again.filter(|_| !interrupt::has_ended_input()) {
+            for (camera, selected) in self.cameras.iter().zip(&mut selected) {
+                self.see_again(camera, &detector, selected)?;
+            }
+        }
+        Ok(selected)
+    }
+
+    /// Follows the target through recordings. Frames of several cameras are combined by their time stamps.
+    fn recordings(&self, detector: &Detector) -> anyhow::Result<Seen> {
+        let is_rig = self.cameras.len() > 1;
+        let tolerance_ns = if is_rig { self.tolerance_ns()? } else { 0 };
+        let every = self.cameras[0].options.every.max(1) * self.every;
+        let mut trackers = vec![Tracker::new(detector.clone()); self.cameras.len()];
+        let mut stems: Vec<Stems> = self.cameras.iter().map(|_| Stems::default()).collect();
+        let (mut seen, mut keyframes) = (Seen::default(), Keyframes::of_every(every));
+        let (mut progress, mut together) = (FrameProgress::new(None), Together::new(self));
+        let frames = self.cameras.iter().map(|camera| {
+            let frames = camera.images.frames(&camera.options, true);
+            Box::new(frames) as Box<dyn Iterator<Item = _> + Send>
+        });
+        for set in FrameSets::new(frames, tolerance_ns) {
+            if interrupt::is_raised() {
+                break;
+            }
+            let mut frames = Vec::new();
+            for (frame, stems) in set.into_iter().zip(&mut stems) {
+                let frame = match frame.transpose() {
+                    Ok(frame) => frame,
+                    Err(error) => {
+                        seen.errors.push(error);
+                        None
+                    }
+                };
+                if let Some(frame) = &frame {
+                    stems.claim_stem(&frame.stem(), frame.path())?;
+                }
+                frames.push(frame);
+            }
+            let Some(first) = frames.iter().flatten().next() else { continue };
+            let (part, mut name) = (first.part(), first.stem());
+            if is_rig {
+                let Some(number) = together.add(&frames) else { continue };
+                if !number.is_multiple_of(self.every) {
+                    continue;
+                }
+                name = format!("set-{number:06}");
+            }
+            let found = frames.into_par_iter().zip(&mut trackers).map(|(frame, tracker)| {
+                frame.map(|frame| self.one(frame, |image, name| tracker.detect(image, name)))
+            });
+            let found: Vec<Option<anyhow::Result<Detection>>> = found.collect();
+            let found: Vec<Option<Detection>> = found.into_iter().map(|one| seen.of(one)).collect();
+            let found_in = |found: &Detection| !found.grids.is_empty();
+            progress.add(found.iter().flatten().any(found_in), part);
+            keyframes.add(name, found);
+        }
+        progress.end();
+        together.report(tolerance_ns)?;
+        Ok(Seen { keyframes: keyframes.finish(), ..seen })
+    }
+
+    /// Half of the shortest interval between frames: within it, no frame has two possible partners.
+    fn tolerance_ns(&self) -> anyhow::Result<i64> {
+        let intervals = self.cameras.iter().map(|camera| {
+            // An error is reported when the frames are read.
+            interval_ns(camera.images.frames(&camera.options, false)).ok_or_else(|| {
+                let why = camera.images.frames(&camera.options, false).find_map(Result::err);
+                let none =
+                    || anyhow!("no time stamps, by which frames of several cameras are combined");
+                why.unwrap_or_else(none).context(format!("--camera {}", camera.name))
+            })
+        });
+        let intervals = intervals.collect::<anyhow::Result<Vec<i64>>>()?;
+        Ok(intervals.into_iter().min().unwrap_or(0) / 2)
+    }
+
+    /// Detects the target in photographs, several at a time. Photographs of several cameras are combined by their names.
+    /// Those that cannot be read are reported.
+    fn photographs(&self, detector: &Detector) -> anyhow::Result<Seen> {
+        let counts = self.cameras.iter().map(|camera| camera.images.count());
+        let progress = Mutex::new(FrameProgress::new(counts.sum()));
+        let threads = rayon::ThreadPoolBuilder::new().build()?;
+        let (mut seen, mut frames) = (Seen::default(), HashMap::new());
+        for (index, camera) in self.cameras.iter().enumerate() {
+            let mut stems = Stems::default();
+            let images = camera.images.frames(&camera.options, true).map(|frame| {
+                let frame = frame?;
+                stems.claim_stem(&frame.stem(), frame.path())?;
+                Ok(frame)
+            });
+            let found = Mutex::new(BTreeMap::new());
+            images_at_once::for_each(&threads, self.limits, images, |index, frame| {
+                if interrupt::is_raised() {
+                    return;
+                }
+                let stem = frame.as_ref().map_or(String::new(), Frame::stem);
+                let one = frame
+                    .and_then(|frame| self.one(frame, |image, name| detector.detect(image, name)));
+                if let Ok(found) = &one {
+                    let mut progress = progress.lock().expect("no thread panics here");
+                    progress.add(!found.grids.is_empty(), None);
+                }
+                found.lock().expect("no thread panics here").insert(index, (stem, one));
+            });
+            for (stem, one) in found.into_inner().expect("no thread panics here").into_values() {
+                let Some(one) = seen.of(Some(one)) else { continue };
+                let frame = *frames.entry(stem.clone()).or_insert_with(|| {
+                    let none = vec![None; self.cameras.len()];
+                    seen.keyframes.push(Keyframe::at_rest(stem, none));
+                    seen.keyframes.len() - 1
+                });
+                seen.keyframes[frame].detections[index] = Some(one);
+            }
+        }
+        progress.into_inner().expect("no thread panics here").end();
+        Ok(seen)
+    }
+
+    /// Detects the target in one image.
+    fn one(
+        &self,
+        frame: Frame,
+        detect: impl FnOnce(&deltille::raster::AnyGray, &str) -> Detection,
+    ) -> anyhow::Result<Detection> {
+        let (name, time_ns) = (frame.name(), frame.time_ns());
+        let photograph = frame.read(self.limits, false)?;
+        let mut found = detect(&photograph.image, &name);
+        (found.file, found.time_ns) = (photograph.notes, time_ns);
+        Ok(found)
+    }
+
+    /// Returns the detections of each camera in the keyframes to calibrate with; all keyframes without a limit.
+    fn selected(
+        &self,
+        keyframes: Vec<Keyframe>,
+        reference: &Reference,
+        most: Option<u32>,
+    ) -> anyhow::Result<Vec<Vec<(String, Detection)>>> {
+        let motion_px: BTreeMap<String, f64> =
+            keyframes.iter().map(|frame| (frame.name.clone(), frame.motion_px)).collect();
+        let mut cameras = vec![Vec::new(); self.cameras.len()];
+        for Keyframe { name, detections, .. } in keyframes {
+            for (of_camera, found) in cameras.iter_mut().zip(detections) {
+                of_camera.extend(found.map(|found| (name.clone(), found)));
+            }
+        }
+        let Some(most) = most else { return Ok(cameras) };
+        let mut calibration = Calibration::of(reference, reference.panels());
+        for (camera, detections) in self.cameras.iter().zip(&cameras) {
+            let mut views = views(detections, reference)?.views;
+            if self.cameras.len() > 1 {
+                // A rig cannot use the others, see `take_known`.
+                views.retain(|view| reference.labels_are_of_board(view));
+            }
+            let intrinsics = camera.intrinsics.clone();
+            calibration = calibration.with(CameraViews::new(camera.name, views, intrinsics));
+        }
+        let chosen = calibration.informative_frames(&motion_px, most as usize);
+        for of_camera in &mut cameras {
+            of_camera.retain(|(name, _)| chosen.contains(name));
+        }
+        Ok(cameras)
+    }
+
+    /// Detects the target in the selected images again, with the joint estimate of the ink.
+    fn see_again(
+        &self,
+        camera: &FilmCamera,
+        detector: &Detector,
+        selected: &mut [(String, Detection)],
+    ) -> anyhow::Result<()> {
+        let mut wanted: BTreeMap<String, &mut Detection> =
+            selected.iter_mut().map(|(_, found)| (found.image.clone(), found)).collect();
+        for frame in camera.images.frames(&camera.options, false) {
+            let Ok(frame) = frame else { continue };
+            let Some(found) = wanted.remove(&frame.name()) else { continue };
+            *found = self.one(frame, |image, name| detector.detect(image, name))?;
+            if wanted.is_empty() {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Seen {
+    /// Records the result of an image, and returns the detection.
+    fn of(&mut self, found: Option<anyhow::Result<Detection>>) -> Option<Detection> {
+        match found? {
+            Ok(found) => {
+                self.inks.push(found.ink);
+                Some(found)
+            }
+            Err(error) => {
+                self.errors.push(error);
+                None
+            }
+        }
+    }
+
+    /// Reports the errors of single frames, and whether a signal ended the reading. Fails if there is nothing to calibrate
+    /// with.
+    fn ended(mut self) -> anyhow::Result<Self> {
+        let is_empty = self.keyframes.is_empty();
+        let frames = counted(self.inks.len(), "frame");
+        if interrupt::is_raised() {
+            ensure!(!is_empty, Interrupted(format!("no board found in {frames}")));
+            log!("note: interrupted after {frames}; calibrating with these");
+        }
+        interrupt::end_input();
+        ensure!(!is_empty || !self.errors.is_empty(), "no board of this kind found in {frames}");
+        let last = self.errors.pop();
+        self.errors.iter().for_each(report);
+        match last {
+            Some(error) if self.inks.is_empty() => return Err(error),
+            last => last.iter().for_each(report),
+        }
+        Ok(self)
+    }
+}
+
+/// Statistics of the frames of several cameras.
+struct Together<'a> {
+    names: Vec<&'a str>,
+    /// Frames of each camera without one of another camera at the same time.
+    alone: Vec<usize>,
+    /// First and last time stamp of each camera, ns.
+    times: Vec<Option<[i64; 2]>>,
+    sets: u64,
+    /// Largest difference of time stamps within a set, ns.
+    largest_ns: i64,
+}
+
+impl<'a> Together<'a> {
+    fn new(film: &Film<'a>) -> Self {
+        let names: Vec<&str> = film.cameras.iter().map(|camera| camera.name).collect();
+        let count = names.len();
+        Self { names, alone: vec![0; count], times: vec![None; count], sets: 0, largest_ns: 0 }
+    }
+
+    /// Counts frames of the same time, and returns the number of their set; `None` if there is only one frame.
+    fn add(&mut self, frames: &[Option<Frame>]) -> Option<u64> {
+        let stamps = frames.iter().map(|frame| frame.as_ref().and_then(Frame::time_ns));
+        let stamps: Vec<Option<i64>> = stamps.collect();
+        for (times, stamp) in self.times.iter_mut().zip(&stamps) {
+            let Some(stamp) = *stamp else { continue };
+            times.get_or_insert([stamp; 2])[1] = stamp;
+        }
+        if frames.iter().flatten().count() < 2 {
+            let alone = self.alone.iter_mut().zip(frames);
+            alone.for_each(|(alone, frame)| *alone += usize::from(frame.is_some()));
+            return None;
+        }
+        let (first, last) = (stamps.iter().flatten().min(), stamps.iter().flatten().max());
+        let spread = first.zip(last).map_or(0, |(first, last)| last - first);
+        self.largest_ns = self.largest_ns.max(spread);
+        self.sets += 1;
+        Some(self.sets - 1)
+    }
+
+    /// Reports the number of sets, and of frames that are in none; fails if there is no set.
+    fn report(&self, tolerance_ns: i64) -> anyhow::Result<()> {
+        let [tolerance, largest] = [tolerance_ns, self.largest_ns].map(|ns| ns as f64 / 1e6);
+        let cameras = || self.names.iter().zip(&self.alone);
+        if self.names.len() < 2 || interrupt::is_raised() && self.sets == 0 {
+            return Ok(());
+        }
+        let spans = self.names.iter().zip(&self.times).map(|(name, times)| match times {
+            Some(times) => {
+                let [from, to] = times.map(|ns| ns as f64 / 1e9);
+                format!("{name} from {from:.3} to {to:.3} s")
+            }
+            None => format!("{name} has no images"),
+        });
+        ensure!(
+            self.sets > 0,
+            "no two images have time stamps within {tolerance:.1} ms, half of the frame interval: {}; the clocks of the \
+             cameras must agree",
+            spans.collect::<Vec<_>>().join(", ")
+        );
+        let alone: Vec<String> = cameras()
+            .filter(|(_, alone)| **alone > 0)
+            .map(|(name, alone)| format!("{} of {name}", counted(*alone, "image")))
+            .collect();
+        let alone = match alone.is_empty() {
+            true => String::new(),
+            false => format!("; {} without a partner, not used", alone.join(", ")),
+        };
+        let sets = counted(self.sets as usize, "set");
+        log!(
+            "{sets} of simultaneous images, at most {largest:.1} ms apart (limit {tolerance:.1} ms){alone}"
+        );
+        Ok(())
     }
 }
 
@@ -109,165 +454,4 @@ fn detector(reference: &Reference) -> anyhow::Result<Detector> {
     }
     let targets: Vec<_> = reference.targets().iter().collect();
     Detector::for_targets(&targets, config).context("--target")
-}
-
-/// Returns the detections of the keyframes to calibrate with.
-fn selected(
-    keyframes: &[Keyframe],
-    reference: &Reference,
-    intrinsics: &Intrinsics,
-    most: usize,
-) -> anyhow::Result<Vec<(String, Detection)>> {
-    let all = keyframes.iter().map(|frame| (frame.name.clone(), frame.detection.clone()));
-    let mut all: Vec<(String, Detection)> = all.collect();
-    if all.len() <= most {
-        return Ok(all);
-    }
-    let motion: BTreeMap<&str, f64> =
-        keyframes.iter().map(|frame| (frame.name.as_str(), frame.motion_px)).collect();
-    let views = views(&all, reference)?.views;
-    let motion_px: Vec<f64> = views.iter().map(|view| motion[view.name.as_str()]).collect();
-    let names: Vec<String> = views.iter().map(|view| view.name.clone()).collect();
-    let calibration = Calibration::of(reference, reference.panels());
-    let calibration = calibration.camera("camera", views, intrinsics.clone());
-    let chosen = calibration.informative_views(&motion_px, most);
-    let chosen: Vec<&String> = chosen.into_iter().map(|index| &names[index]).collect();
-    all.retain(|(name, _)| chosen.contains(&name));
-    Ok(all)
-}
-
-/// Images to detect a target in.
-struct Film<'a> {
-    args: &'a FilmArgs,
-    images: Images,
-    limits: &'a Limits,
-    detector: Detector,
-}
-
-/// Keyframes, and the ink spread of every frame.
-type Seen = (Vec<Keyframe>, Vec<Option<InkEstimate>>);
-
-impl Film<'_> {
-    /// Detects the target in one image.
-    fn one(
-        &self,
-        frame: Frame,
-        detect: impl FnOnce(&deltille::raster::AnyGray, &str) -> Detection,
-    ) -> anyhow::Result<(String, Detection)> {
-        let (name, stem, time_ns) = (frame.name(), frame.stem(), frame.time_ns());
-        let photograph = frame.read(self.limits, false)?;
-        let mut found = detect(&photograph.image, &name);
-        (found.file, found.time_ns) = (photograph.notes, time_ns);
-        Ok((stem, found))
-    }
-
-    /// Follows the target through recordings.
-    fn recordings(&self) -> anyhow::Result<Seen> {
-        let options = self.args.recording.options(*self.limits);
-        let mut tracker = Tracker::new(self.detector.clone());
-        let mut keyframes = Keyframes::of_every(options.every);
-        let (mut inks, mut errors) = (Vec::new(), Vec::new());
-        let (mut stems, mut progress) = (Stems::default(), FrameProgress::new(None));
-        for frame in self.images.frames(&options, true) {
-            let part = frame.as_ref().ok().and_then(Frame::part);
-            if let Ok(frame) = &frame {
-                stems.claim_stem(&frame.stem(), frame.path())?;
-            }
-            let found =
-                frame.and_then(|frame| self.one(frame, |image, name| tracker.detect(image, name)));
-            match found {
-                Ok((stem, found)) => {
-                    progress.add(!found.grids.is_empty(), part);
-                    inks.push(found.ink);
-                    keyframes.add(stem, found);
-                }
-                Err(error) => errors.push(error),
-            }
-            if interrupt::is_raised() {
-                break;
-            }
-        }
-        progress.end();
-        ended(keyframes.finish(), inks, errors)
-    }
-
-    /// Detects the target in photographs, several at a time. Those that cannot be read are reported.
-    fn photographs(&self) -> anyhow::Result<Seen> {
-        let options = self.args.recording.options(*self.limits);
-        let mut stems = Stems::default();
-        let frames = self.images.frames(&options, true).map(|frame| {
-            let frame = frame?;
-            stems.claim_stem(&frame.stem(), frame.path())?;
-            Ok(frame)
-        });
-        let progress = Mutex::new(FrameProgress::new(self.images.count()));
-        let seen = Mutex::new(BTreeMap::new());
-        let threads = rayon::ThreadPoolBuilder::new().build()?;
-        images_at_once::for_each(&threads, self.limits, frames, |index, frame| {
-            if interrupt::is_raised() {
-                return;
-            }
-            let found = frame
-                .and_then(|frame| self.one(frame, |image, name| self.detector.detect(image, name)));
-            if let Ok((_, found)) = &found {
-                let mut progress = progress.lock().expect("no thread panics here");
-                progress.add(!found.grids.is_empty(), None);
-            }
-            seen.lock().expect("no thread panics here").insert(index, found);
-        });
-        progress.into_inner().expect("no thread panics here").end();
-        let (mut keyframes, mut inks, mut errors) = (Vec::new(), Vec::new(), Vec::new());
-        for found in seen.into_inner().expect("no thread panics here").into_values() {
-            match found {
-                Ok((stem, found)) => {
-                    inks.push(found.ink);
-                    keyframes.push(Keyframe::alone(stem, found));
-                }
-                Err(error) => errors.push(error),
-            }
-        }
-        ended(keyframes, inks, errors)
-    }
-
-    /// Detects the target in the selected images again, with the joint estimate of the ink.
-    fn see_again(
-        &self,
-        detector: &Detector,
-        selected: &mut [(String, Detection)],
-    ) -> anyhow::Result<()> {
-        let options = self.args.recording.options(*self.limits);
-        let mut wanted: BTreeMap<String, &mut Detection> =
-            selected.iter_mut().map(|(name, found)| (name.clone(), found)).collect();
-        for frame in self.images.frames(&options, false) {
-            let Ok(frame) = frame else { continue };
-            let Some(found) = wanted.remove(&frame.stem()) else { continue };
-            *found = self.one(frame, |image, name| detector.detect(image, name))?.1;
-            if wanted.is_empty() {
-                break;
-            }
-        }
-        Ok(())
-    }
-}
-
-/// Reports the errors of single frames, and whether a signal ended the reading. Fails if there is nothing to calibrate with.
-fn ended(
-    keyframes: Vec<Keyframe>,
-    inks: Vec<Option<InkEstimate>>,
-    mut errors: Vec<anyhow::Error>,
-) -> anyhow::Result<Seen> {
-    let frames = counted(inks.len(), "frame");
-    if interrupt::is_raised() {
-        ensure!(!keyframes.is_empty(), Interrupted(format!("no board found in {frames}")));
-        log!("note: interrupted after {frames}; calibrating with these");
-    }
-    interrupt::end_input();
-    ensure!(!keyframes.is_empty() || !errors.is_empty(), "no board of this kind found in {frames}");
-    let last = errors.pop();
-    errors.iter().for_each(report);
-    match last {
-        Some(error) if inks.is_empty() => return Err(error),
-        last => last.iter().for_each(report),
-    }
-    Ok((keyframes, inks))
 }

@@ -25,7 +25,7 @@ use deltille::detect::{Detection, Detector, DetectorConfig};
 use deltille::export::kind::Kind;
 use deltille::export::sheet::Sheet;
 use deltille::export::{next_view, svg};
-use deltille::frames::Frame;
+use deltille::frames::{Frame, is_recording};
 use deltille::layout::Printing;
 use deltille::limits::Limits;
 use deltille::raster::AnyGray;
@@ -109,6 +109,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     target_file::set_family(&mut printing.target, args.family.as_deref())?;
     let target = &printing.target;
+    ensure!(
+        !is_recording(&args.folder),
+        "{}: guide watches a folder in which photographs are saved; pass this recording to `deltille calibrate`",
+        args.folder.display()
+    );
     ensure!(
         args.folder.is_dir(),
         "{} is not a folder; expected the folder in which photographs are saved",

@@ -4,7 +4,8 @@
 //! file and as a report, and diagnoses. The modules, in the order in which a command uses them:
 //!
 //! 1. `guide` proposes the next photograph to take.
-//! 2. `one_camera` is `deltille calibrate`, and `rig` is `deltille rig`: their options and files.
+//! 2. `one_camera` is `deltille calibrate`, and `rig` is `deltille rig`: their options and files; `rig_cameras` reads the
+//!    input of each camera of a rig.
 //! 3. `sightings` reads the common input: detections, the target or untagged board, and the
 //!    properties of its print.
 //! 4. `filming` finds the target in photographs and recordings, instead of detections.
@@ -18,5 +19,6 @@ pub mod guide;
 pub mod one_camera;
 mod report_page;
 pub mod rig;
+mod rig_cameras;
 pub mod sightings;
 pub mod solving;

@@ -6,17 +6,19 @@ use std::process::ExitCode;
 use anyhow::{Context, bail, ensure};
 
 use super::report_page::check_images;
+use super::rig_cameras::{CamerasArgs, Source, check_named, named};
 use super::sightings;
 use super::sightings::{GridArgs, SheetArgs};
 use super::solving::{
     Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out,
     projection_uncertainty, sample, without_outliers,
 };
-use crate::deltille::files::limits::FileLimits;
+use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::written::{
     File, check_places, same_file, sample_of, text_file, write_all,
 };
 use crate::deltille::files::{camera_file, target_file};
+use crate::interrupt;
 use crate::output::{Overwrite, check_folder, fixed, log, say};
 use crate::run::{FAILED, report};
 use crate::values::format;
@@ -30,17 +32,14 @@ use deltille::export::camera::FormatError;
 use deltille::export::{RIG_FORMATS, RigFile, RigFormat, rig, saved};
 use deltille::layout::Printing;
 use deltille::report::target_map_svg;
-use deltille::targets::{Name, Target};
+use deltille::targets::Target;
 use deltille_core::words::counted;
 
 /// Arguments of `deltille rig`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Camera and the folder of its detections, such as left=corners/left; repeat for each camera.
-    /// The first camera defines the rig's frame. Images taken at the same time must have the same
-    /// file name in each folder
-    #[arg(long, required = true, value_name = "NAME=FOLDER", value_parser = named)]
-    camera: Vec<(String, PathBuf)>,
+    #[command(flatten)]
+    cameras: CamerasArgs,
     /// Target description: the .json written with the target; repeatable for several targets that do not move
     /// relative to each other (no camera needs to see more than one)
     #[arg(long, required_unless_present = "grid", value_name = "FILE")]
@@ -48,7 +47,7 @@ pub struct Args {
     #[command(flatten)]
     grid: GridArgs,
     /// Camera model of every camera, see `deltille calibrate`
-    #[arg(long, default_value = "radtan")]
+    #[arg(long, default_value = "auto")]
     model: ModelChoice,
     /// Camera with known, fixed intrinsics, and its file
     #[arg(long, value_name = "NAME=FILE", value_parser = named)]
@@ -73,32 +72,17 @@ pub struct Args {
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
     #[command(flatten)]
-    limits: FileLimits,
+    limits: ImageLimits,
     #[command(flatten)]
     overwrite: Overwrite,
 }
 
-fn named(text: &str) -> Result<(String, PathBuf), String> {
-    match text.split_once('=') {
-        Some((name, path)) if !path.is_empty() => {
-            Name::new(name).map(|name| (name.to_string(), path.into()))
-        }
-        _ => Err("expected a name and a path, such as left=corners/left".to_owned()),
-    }
-}
-
 /// Calibrates a rig and writes it.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    if args.camera.len() < 2 && !args.refine_target {
-        bail!(
-            "--camera: a rig needs at least two cameras, or one with --refine-target; use `deltille calibrate` for one camera"
-        );
-    }
-    let names: Vec<&str> = args.camera.iter().map(|(name, _)| name.as_str()).collect();
-    check_names(&names)?;
+    let sources = args.cameras.sources(args.refine_target)?;
+    let names: Vec<&str> = sources.iter().map(|source| source.name.as_str()).collect();
     check_named("--known", &args.known, &names)?;
     check_named("--images", &args.images, &names)?;
-    check_folders(&args.camera)?;
     check_folder(&args.output).context("-o")?;
     let limits = args.limits.limits();
     let (printed, grid) = match args.grid.read_target()? {
@@ -113,18 +97,20 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let sheet = args.sheet.read(&limits, &reference.identities(), &printed)?;
     let panels = sightings::panels(&reference, &sheet)?;
-    let cameras = args.camera.iter().map(|(name, _)| args.intrinsics(name, &targets));
+    let cameras = names.iter().map(|name| args.intrinsics(name, &targets));
     let cameras = cameras.collect::<anyhow::Result<Vec<Intrinsics>>>()?;
-    args.check_files(&cameras, &printed)?;
+    args.check_files(&names, &cameras, &printed)?;
     let page = args.solve.page("rig", args.overwrite)?;
     let mut calibration = Calibration::of(&reference, panels).refine_panels(args.refine_target);
     let (mut left_out, mut ink, mut seen) = (Vec::new(), Vec::new(), Vec::new());
-    for ((name, folder), intrinsics) in args.camera.iter().zip(cameras) {
-        let read =
-            sightings::read(std::slice::from_ref(folder), &reference, &limits, args.assume_target);
+    let given = args.cameras.read(&sources, &reference, &cameras, &limits)?;
+    for ((Source { name, option, .. }, given), intrinsics) in sources.iter().zip(given).zip(cameras)
+    {
+        let read = sightings::views_of(given, &reference, args.assume_target);
+        let read = read.and_then(sightings::shown);
         let sightings::Read { mut views, left_out: out, ink: of_camera, detections, .. } =
-            read.with_context(|| format!("--camera {name}"))?;
-        check_own(name, &detections, &seen)?;
+            read.with_context(|| option.clone())?;
+        check_own(option, &detections, &seen)?;
         seen.push((name, detections));
         let of_camera_out = |out: Vec<Excluded>| {
             out.into_iter().map(|out| Excluded { camera: Some(name.clone()), ..out })
@@ -143,9 +129,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         calibration = calibration.with(CameraViews::new(name, views, intrinsics));
     }
     let (mut tried, mut text) = (Vec::new(), String::new());
-    for (index, (name, _)) in args.camera.iter().enumerate() {
+    for (index, Source { name, option, .. }) in sources.iter().enumerate() {
         let of_camera = args.model.choose(&mut calibration, index);
-        let of_camera = of_camera.with_context(|| format!("--camera {name}"))?;
+        let of_camera = of_camera.with_context(|| option.clone())?;
         if !of_camera.is_empty() {
             text += &format!("{name}:\n{}", chosen(&of_camera));
         }
@@ -176,8 +162,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (files, refused) = args.files(&cameras, &json, estimate, &printed)?;
     let mut written = write_all(&args.output, &files, args.overwrite)?;
     if let Some(page) = page {
-        let folder = |(name, _): &(String, PathBuf)| of_name(&args.images, name);
-        let folders: Vec<_> = args.camera.iter().map(folder).collect();
+        let folders: Vec<_> = names.iter().map(|name| of_name(&args.images, name)).collect();
         solved.write_page(&page, "rig", &folders, args.overwrite)?;
         written.push(page);
     }
@@ -186,6 +171,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     for path in written {
         say!("wrote {}", path.display());
+    }
+    if interrupt::has_ended_input() {
+        return Ok(ExitCode::from(interrupt::exit_code()));
     }
     Ok(formats_left_out(&refused).unwrap_or(solved.exit_code()))
 }
@@ -205,10 +193,15 @@ impl Args {
     }
 
     /// Rejects files that could not be written, before the work starts.
-    fn check_files(&self, cameras: &[Intrinsics], printed: &[Printing]) -> anyhow::Result<()> {
+    fn check_files(
+        &self,
+        names: &[&str],
+        cameras: &[Intrinsics],
+        printed: &[Printing],
+    ) -> anyhow::Result<()> {
         let samples: Vec<Camera> = cameras.iter().map(sample).collect();
-        let cameras = self.camera.iter().zip(&samples);
-        let cameras = cameras.map(|((name, _), camera)| (name.as_str(), camera, Pose::IDENTITY));
+        let cameras = names.iter().zip(&samples);
+        let cameras = cameras.map(|(&name, camera)| (name, camera, Pose::IDENTITY));
         let mut found = Estimate::default();
         found.map = self.solve.measures_target().then(|| TargetMap::new(Vec::new(), [0.0; 2]));
         let json = sample_of(rig::SCHEMA);
@@ -284,43 +277,10 @@ impl Args {
     }
 }
 
-/// Rejects camera names that are not valid or not distinct file names.
-fn check_names(names: &[&str]) -> anyhow::Result<()> {
-    for (index, name) in names.iter().enumerate() {
-        let is_same = |other: &&&str| other.to_lowercase() == name.to_lowercase();
-        let is_taken = ["rig", "camchain"].iter().any(|own| is_same(&own));
-        if is_taken || name.contains(['/', '\\']) || name.starts_with('.') {
-            bail!("--camera: {name} is not a valid file name");
-        }
-        match names[..index].iter().find(is_same) {
-            Some(other) if other == name => bail!("--camera: {name} is given twice"),
-            Some(other) => bail!(
-                "--camera: {other} and {name} differ only in case, so their files would collide on some systems"
-            ),
-            None => {}
-        }
-    }
-    Ok(())
-}
-
-/// Rejects folders that are given for two cameras.
-fn check_folders(cameras: &[(String, PathBuf)]) -> anyhow::Result<()> {
-    let mut places: Vec<(PathBuf, &str)> = Vec::new();
-    for (name, folder) in cameras {
-        // Missing folders are reported when they are read.
-        let Ok(place) = folder.canonicalize() else { continue };
-        if let Some((_, other)) = places.iter().find(|(there, _)| *there == place) {
-            bail!("--camera: {other} and {name} have the same folder, {}", folder.display());
-        }
-        places.push((place, name));
-    }
-    Ok(())
-}
-
 /// Rejects images that also belong to another camera: two cameras never detect exactly the same
 /// corners.
 fn check_own(
-    name: &str,
+    option: &str,
     detections: &[(String, Detection)],
     others: &[(&String, Vec<(String, Detection)>)],
 ) -> anyhow::Result<()> {
@@ -329,20 +289,7 @@ fn check_own(
             theirs.iter().any(|(_, of_other)| sightings::is_same(&own.1, of_other))
         };
         if let Some((picture, _)) = detections.iter().find(is_theirs) {
-            bail!("--camera {name}: {picture} has the same corners as an image of {other}");
-        }
-    }
-    Ok(())
-}
-
-/// Rejects names of unknown cameras, and duplicates.
-fn check_named(option: &str, given: &[(String, PathBuf)], cameras: &[&str]) -> anyhow::Result<()> {
-    for (index, (name, _)) in given.iter().enumerate() {
-        if given[..index].iter().any(|(other, _)| other == name) {
-            bail!("{option}: {name} is given twice");
-        }
-        if !cameras.contains(&name.as_str()) {
-            bail!("{option}: no --camera is named {name}");
+            bail!("{option}: {picture} has the same corners as an image of {other}");
         }
     }
     Ok(())

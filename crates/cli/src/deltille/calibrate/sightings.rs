@@ -289,24 +289,13 @@ pub struct Read {
     pub detections: Vec<(String, Detection)>,
 }
 
-/// Reads the views in detection files or folders. Reports detections that do not belong to the target on standard
-/// error. If the target is assumed, the names in the detections are ignored.
-pub fn read(
-    paths: &[PathBuf],
-    reference: &Reference,
-    limits: &Limits,
-    is_assumed: bool,
-) -> anyhow::Result<Read> {
-    shown(read_any(paths, reference, limits, is_assumed)?)
-}
-
 /// Returns an error if no image shows the target.
-fn shown(read: Read) -> anyhow::Result<Read> {
+pub fn shown(read: Read) -> anyhow::Result<Read> {
     ensure!(!read.views.is_empty(), nothing_shown(&read.detections));
     Ok(read)
 }
 
-/// Like [`read`], but accepts that no image shows the target.
+/// Reads the views in detection files or folders, see [`views_of`].
 pub fn read_any(
     paths: &[PathBuf],
     reference: &Reference,
@@ -317,7 +306,7 @@ pub fn read_any(
 }
 
 /// Reads detection files or folders.
-fn given(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Given> {
+pub fn given(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Given> {
     let (mut different, mut foreign) = (Different::default(), Vec::new());
     let mut copies = Vec::new();
     let Places { texts, tables } = places(paths)?;
@@ -372,8 +361,9 @@ fn given(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Given> {
     Ok(Given { detections, files, first: paths[0].clone() })
 }
 
-/// Converts detections to views.
-fn views_of(given: Given, reference: &Reference, is_assumed: bool) -> anyhow::Result<Read> {
+/// Converts detections to views. Reports detections that do not belong to the target on standard error. If the target is
+/// assumed, the names in the detections are ignored.
+pub fn views_of(given: Given, reference: &Reference, is_assumed: bool) -> anyhow::Result<Read> {
     let Given { mut detections, files, first } = given;
     if is_assumed {
         assume(&mut detections, reference);

@@ -1,0 +1,302 @@
+//! The cameras of `deltille rig`: their names, and their detections, photographs or recordings.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, anyhow, bail, ensure};
+
+use super::filming::{self, Film, FilmCamera, Given};
+use super::sightings;
+use crate::deltille::files::images::Images;
+use crate::values::whole;
+use deltille::calibrate::{Intrinsics, Reference};
+use deltille::frames::{FrameOptions, Frames, FramesError, Problem, is_recording};
+use deltille::limits::Limits;
+use deltille::targets::Name;
+
+/// The cameras and their images.
+#[derive(clap::Args)]
+pub struct CamerasArgs {
+    /// A recording of all cameras, an MCAP file or a bag of ROS 1 or 2, with --topic for each camera
+    #[arg(value_name = "RECORDING", conflicts_with = "camera")]
+    recording: Option<PathBuf>,
+    /// Camera and its video, recording, folder of photographs or folder of detections, such as left=left.mp4; repeat for each
+    /// camera. The first camera defines the rig's frame. Frames of recordings are combined by their time stamps, photographs and
+    /// detections by their file names
+    #[arg(long, required_unless_present = "recording", value_name = "NAME=PATH", value_parser = named)]
+    camera: Vec<(String, PathBuf)>,
+    /// Topic of a camera in RECORDING, such as /left/image_raw; repeat for each camera. The camera is named after the part of the
+    /// topic that differs, or NAME. With --camera NAME=PATH, the topic in its recording
+    #[arg(long, value_name = "[NAME=]TOPIC", value_parser = topic)]
+    topic: Vec<(Option<String>, String)>,
+    /// Use only every N-th set of simultaneous frames of recordings
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1..=1_000_000u64))]
+    every: u64,
+    /// Maximum number of frames of the rig: those in which the target is still, and which together determine the cameras best
+    /// [default: 60 of recordings, all photographs]
+    #[arg(long, value_name = "N", value_parser = whole(1..=100_000u32))]
+    views: Option<u32>,
+}
+
+/// A camera, and where its images are.
+pub struct Source {
+    pub name: String,
+    /// The option that names it, for messages.
+    pub option: String,
+    path: PathBuf,
+    topic: Option<String>,
+}
+
+/// Parses a camera and a path.
+pub fn named(text: &str) -> Result<(String, PathBuf), String> {
+    match text.split_once('=') {
+        Some((name, path)) if !path.is_empty() => {
+            Name::new(name).map(|name| (name.to_string(), path.into()))
+        }
+        _ => Err("expected a name and a path, such as left=corners/left".to_owned()),
+    }
+}
+
+/// Parses a topic, with the name of its camera or without.
+fn topic(text: &str) -> Result<(Option<String>, String), String> {
+    match text.split_once('=') {
+        _ if text.is_empty() => Err("expected a topic, such as /left/image_raw".to_owned()),
+        Some((name, topic)) if !topic.is_empty() => {
+            Name::new(name).map(|name| (Some(name.to_string()), topic.to_owned()))
+        }
+        Some(_) => Err("expected a name and a topic, such as left=/left/image_raw".to_owned()),
+        None => Ok((None, text.to_owned())),
+    }
+}
+
+impl CamerasArgs {
+    /// Returns the cameras. A rig has several, unless it is used to measure a target.
+    pub fn sources(&self, is_one_enough: bool) -> anyhow::Result<Vec<Source>> {
+        let sources = match &self.recording {
+            Some(recording) => self.in_one(recording)?,
+            None => self.in_several()?,
+        };
+        if sources.len() < 2 && !is_one_enough {
+            let option = if self.recording.is_some() { "--topic" } else { "--camera" };
+            bail!(
+                "{option}: a rig needs at least two cameras, or one with --refine-target; use `deltille calibrate` for one camera"
+            );
+        }
+        check_places(&sources)?;
+        let names: Vec<&str> = sources.iter().map(|source| source.name.as_str()).collect();
+        check_names(&names)?;
+        Ok(sources)
+    }
+
+    /// The cameras of one recording.
+    fn in_one(&self, recording: &Path) -> anyhow::Result<Vec<Source>> {
+        if self.topic.is_empty() {
+            let show = recording.display();
+            return match Frames::open(recording, &FrameOptions::default()) {
+                Err(FramesError::Recording { problem: Problem::Topics(topics), .. }) => bail!(
+                    "{show}: choose the topic of each camera with --topic (topics with images: {})",
+                    topics.join(", ")
+                ),
+                Ok(_) => bail!(
+                    "{show}: the images of one camera only; pass those of each camera with --camera NAME=PATH"
+                ),
+                Err(error) => Err(error.into()),
+            };
+        }
+        let topics: Vec<&str> = self.topic.iter().map(|(_, topic)| topic.as_str()).collect();
+        let names = differing(&topics);
+        let source = |((name, topic), differing): (&(Option<String>, String), String)| {
+            let name =
+                name.clone().map_or_else(|| Name::new(&differing).map(|name| name.to_string()), Ok);
+            let name = name.map_err(|why| {
+                anyhow!("--topic {topic}: {why}; name the camera with --topic NAME={topic}")
+            })?;
+            let (path, option) = (recording.to_owned(), format!("--topic {topic}"));
+            Ok(Source { name, option, path, topic: Some(topic.clone()) })
+        };
+        self.topic.iter().zip(names).map(source).collect()
+    }
+
+    /// The cameras in files or folders of their own.
+    fn in_several(&self) -> anyhow::Result<Vec<Source>> {
+        for (index, (name, topic)) in self.topic.iter().enumerate() {
+            let Some(name) = name else {
+                bail!(
+                    "--topic {topic}: name its camera, such as --topic {}={topic}",
+                    self.camera[0].0
+                )
+            };
+            let is_it = |(other, _): &(Option<String>, String)| other.as_ref() == Some(name);
+            ensure!(!self.topic[..index].iter().any(is_it), "--topic: {name} is given twice");
+            ensure!(
+                self.camera.iter().any(|(camera, _)| camera == name),
+                "--topic: no --camera is named {name}"
+            );
+        }
+        let source = |(name, path): &(String, PathBuf)| {
+            let topic = self.topic.iter().find(|(of, _)| of.as_ref() == Some(name));
+            Source {
+                name: name.clone(),
+                option: format!("--camera {name}"),
+                path: path.clone(),
+                topic: topic.map(|(_, topic)| topic.clone()),
+            }
+        };
+        Ok(self.camera.iter().map(source).collect())
+    }
+
+    /// Reads the detections of each camera, or detects the target in its images. Of recordings, it selects the frames to
+    /// calibrate cameras with these intrinsics.
+    pub fn read(
+        &self,
+        sources: &[Source],
+        reference: &Reference,
+        intrinsics: &[Intrinsics],
+        limits: &Limits,
+    ) -> anyhow::Result<Vec<Given>> {
+        let paths: Vec<PathBuf> = sources.iter().map(|source| source.path.clone()).collect();
+        if !filming::are_images(&paths)? {
+            let given = sources.iter().map(|source| {
+                let given = sightings::given(std::slice::from_ref(&source.path), limits);
+                given.with_context(|| source.option.clone())
+            });
+            return given.collect();
+        }
+        let cameras = sources.iter().zip(intrinsics);
+        let cameras = cameras.map(|(source, intrinsics)| {
+            let camera = source.camera(intrinsics, limits);
+            camera.with_context(|| source.option.clone())
+        });
+        let cameras = cameras.collect::<anyhow::Result<_>>()?;
+        let film = Film { cameras, every: self.every, views: self.views, limits };
+        let detections = film.see(reference)?;
+        let given = detections.into_iter().zip(&paths);
+        Ok(given.map(|(detections, path)| Given::of_images(detections, path)).collect())
+    }
+}
+
+impl Source {
+    /// Lists the images of the camera. Opens a recording, so that a wrong topic is reported before the first frame is read.
+    fn camera<'a>(
+        &'a self,
+        intrinsics: &'a Intrinsics,
+        limits: &Limits,
+    ) -> anyhow::Result<FilmCamera<'a>> {
+        let mut options = FrameOptions::default();
+        (options.topic, options.limits) = (self.topic.clone(), *limits);
+        if is_recording(&self.path) {
+            check_topic(&self.path, &options)?;
+        }
+        let images = Images::of(std::slice::from_ref(&self.path))?;
+        Ok(FilmCamera { name: &self.name, images, options, intrinsics })
+    }
+}
+
+/// Opens a recording, to report a wrong topic.
+fn check_topic(path: &Path, options: &FrameOptions) -> anyhow::Result<()> {
+    match Frames::open(path, options) {
+        Ok(_) => Ok(()),
+        Err(FramesError::Recording { problem: Problem::Topics(topics), .. }) => bail!(
+            "{}: {} topics contain images; choose one with --topic NAME=TOPIC ({})",
+            path.display(),
+            topics.len(),
+            topics.join(", ")
+        ),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// Returns the parts in which topics differ, without the common first and last parts: left and right of `/left/image_raw` and
+/// `/right/image_raw`.
+fn differing(topics: &[&str]) -> Vec<String> {
+    let parts = |topic: &&str| {
+        let parts = topic.split('/').filter(|part| !part.is_empty());
+        parts.map(str::to_owned).collect::<Vec<_>>()
+    };
+    let all: Vec<Vec<String>> = topics.iter().map(parts).collect();
+    let shortest = all.iter().map(Vec::len).min().unwrap_or(0);
+    let is_common = |part: &dyn Fn(&[String]) -> Option<String>| {
+        all.iter().map(|parts| part(parts)).collect::<BTreeSet<_>>().len() == 1
+    };
+    let first = (0..shortest).take_while(|&i| is_common(&|parts| parts.get(i).cloned())).count();
+    let last = (0..shortest)
+        .take_while(|&i| is_common(&|parts| parts.iter().nth_back(i).cloned()))
+        .count();
+    let rest = |parts: &Vec<String>| match parts.get(first..parts.len().saturating_sub(last)) {
+        Some(rest) if !rest.is_empty() => rest.join("-"),
+        _ => parts.join("-"),
+    };
+    all.iter().map(rest).collect()
+}
+
+/// Rejects camera names that are not valid or not distinct file names.
+fn check_names(names: &[&str]) -> anyhow::Result<()> {
+    for (index, name) in names.iter().enumerate() {
+        let is_same = |other: &&&str| other.to_lowercase() == name.to_lowercase();
+        let is_taken = ["rig", "camchain"].iter().any(|own| is_same(&own));
+        if is_taken || name.contains(['/', '\\']) || name.starts_with('.') {
+            bail!("--camera: {name} is not a valid file name");
+        }
+        match names[..index].iter().find(is_same) {
+            Some(other) if other == name => bail!("--camera: {name} is given twice"),
+            Some(other) => bail!(
+                "--camera: {other} and {name} differ only in case, so their files would collide on some systems"
+            ),
+            None => {}
+        }
+    }
+    Ok(())
+}
+
+/// Rejects images that are given for two cameras.
+fn check_places(sources: &[Source]) -> anyhow::Result<()> {
+    let mut places: Vec<(PathBuf, &Source)> = Vec::new();
+    for source in sources {
+        // Missing files are reported when they are read.
+        let Ok(place) = source.path.canonicalize() else { continue };
+        let is_same =
+            |(there, other): &&(PathBuf, &Source)| *there == place && other.topic == source.topic;
+        if let Some((_, other)) = places.iter().find(is_same) {
+            let what = match &source.topic {
+                Some(topic) => format!("topic, {topic}"),
+                None => format!("images, {}", source.path.display()),
+            };
+            if other.name == source.name {
+                bail!("{}: given twice", source.option);
+            }
+            bail!("{}: {} and {} have the same {what}", source.option, other.name, source.name);
+        }
+        places.push((place, source));
+    }
+    Ok(())
+}
+
+/// Rejects names of unknown cameras, and duplicates.
+pub fn check_named(
+    option: &str,
+    given: &[(String, PathBuf)],
+    cameras: &[&str],
+) -> anyhow::Result<()> {
+    for (index, (name, _)) in given.iter().enumerate() {
+        if given[..index].iter().any(|(other, _)| other == name) {
+            bail!("{option}: {name} is given twice");
+        }
+        if !cameras.contains(&name.as_str()) {
+            bail!("{option}: no camera is named {name}");
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::differing;
+
+    #[test]
+    fn cameras_are_named_after_the_part_of_their_topics_that_differs() {
+        assert_eq!(differing(&["/left/image_raw", "/right/image_raw"]), ["left", "right"]);
+        let mixed = ["/rig/left/image_raw/compressed", "/rig/right/image_raw"];
+        assert_eq!(differing(&mixed), ["left-image_raw-compressed", "right-image_raw"]);
+        assert_eq!(differing(&["/camera", "/camera/compressed"]), ["camera", "compressed"]);
+    }
+}
