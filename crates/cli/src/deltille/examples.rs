@@ -74,6 +74,8 @@ pub const CALIBRATE: &str = "Examples:
   deltille calibrate corners --target desk/desk.json --model radtan --print-scale 1.0012,0.9995";
 
 pub const RIG: &str = "Examples:
+  deltille rig run.mcap --topic /left/image_raw --topic /right/image_raw --target desk/desk.json
+  deltille rig --camera left=left.mp4 --camera right=right.mp4 --target desk/desk.json -o rig
   deltille rig --camera left=corners/l --camera right=corners/r --target ico/ico.json
   deltille rig --camera a=a --camera b=b --known a=a.yaml --target ico/ico.json --refine-target";
 
@@ -90,7 +92,8 @@ pub const POSE: &str = "Examples:
   deltille pose photo.png --target desk/desk.json --camera camera.yaml --all-images";
 
 pub const UNDISTORT: &str = "Examples:
-  deltille undistort photos --camera camera.yaml -o straight";
+  deltille undistort photos --camera camera.yaml -o straight
+  deltille undistort run.mcap --topic /left/image_raw --every 30 --camera left.yaml -o straight";
 
 pub const RECTIFY: &str = "Examples:
   deltille rectify rig.json --pair left,right -o rectified";

@@ -9,7 +9,7 @@ use std::sync::Mutex;
 
 use anyhow::{Context, anyhow, bail, ensure};
 
-use crate::deltille::files::images::{self, Images, Stems};
+use crate::deltille::files::images::{Images, RecordingArgs, Stems};
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::written::{
     File, Staged, bytes_file, check_places, same_file, sample_of, text_file,
@@ -24,9 +24,8 @@ use deltille::camera::{Camera, CameraFile, Field, PixelMap, Rectification, Undis
 use deltille::export::camera::{opencv, ros};
 use deltille::export::kind::{Kind, signed_png};
 use deltille::export::{atomic, saved, undistortion};
-use deltille::frames::Frame;
+use deltille::frames::{Frame, FrameOptions, is_recording};
 use deltille::limits::Limits;
-use deltille::photograph;
 use deltille::remap::remapped;
 use deltille_core::words::counted;
 
@@ -58,10 +57,12 @@ struct ViewArgs {
 /// Arguments of `deltille undistort`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Photographs taken by the camera: files, folders, patterns, or - for a list on standard input; without any,
-    /// only the new camera and the remap tables are written
+    /// Photographs taken by the camera: files, folders, patterns, or - for a list on standard input; videos, MCAP files and bags,
+    /// whose frames become grey. Without any, only the new camera and the remap tables are written
     #[arg(value_name = "IMAGES")]
     images: Vec<PathBuf>,
+    #[command(flatten)]
+    recording: RecordingArgs,
     /// Camera file of `deltille calibrate`, ROS or OpenCV
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
@@ -169,7 +170,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let made = made.context("--field")?;
     let images = Images::of(&args.images)?;
     let (folder, end) = (args.view.output.as_path(), "undistorted");
-    let pictures = Pictures { args: &args.view, folder, camera: &camera, end };
+    let options = args.recording.options(args.view.limits.limits());
+    let pictures = Pictures { args: &args.view, options, folder, camera: &camera, end };
     pictures.check(&images)?;
     let map = args.view.map(&made);
     let view = CameraFile { camera: made.view().clone(), calibrated_with, failed };
@@ -205,6 +207,7 @@ fn describe(view: &Camera, map: &PixelMap) -> String {
 /// Output images of a camera.
 struct Pictures<'a> {
     args: &'a ViewArgs,
+    options: FrameOptions,
     folder: &'a Path,
     camera: &'a Camera,
     /// Suffix of the image names.
@@ -212,17 +215,18 @@ struct Pictures<'a> {
 }
 
 impl Pictures<'_> {
-    fn place(&self, image: &Path) -> anyhow::Result<PathBuf> {
-        Ok(self.folder.join(format!("{}-{}.png", images::stem(image)?, self.end)))
+    fn place(&self, stem: &str) -> PathBuf {
+        self.folder.join(format!("{stem}-{}.png", self.end))
     }
 
     /// Rejects outputs that could not be written, before the work starts.
     fn check(&self, images: &Images) -> anyhow::Result<()> {
         output::check_folder(self.folder).context("-o")?;
         let mut stems = Stems::default();
-        images.named().iter().try_for_each(|image| {
-            stems.claim(image)?;
-            self.args.overwrite.check(&self.place(image)?, &Kind::own_png())
+        // The frames of recordings are not known yet.
+        images.named().iter().filter(|image| !is_recording(image)).try_for_each(|image| {
+            let stem = stems.claim(image)?;
+            self.args.overwrite.check(&self.place(&stem), &Kind::own_png())
         })
     }
 
@@ -238,23 +242,22 @@ impl Pictures<'_> {
         let failed: Mutex<BTreeMap<usize, anyhow::Error>> = Mutex::default();
         let done: Mutex<usize> = Mutex::default();
         let pool = rayon::ThreadPoolBuilder::new().build()?;
-        images_at_once::for_each(
-            &pool,
-            &self.args.limits.limits(),
-            images.iter().map(|image| image.map(Frame::photograph)),
-            |index, image| {
-                if interrupt::is_raised() {
-                    return;
+        let mut stems = Stems::default();
+        let frames = images.frames(&self.options, true).map(|frame| {
+            let frame = frame?;
+            stems.claim_stem(&frame.stem(), frame.path())?;
+            Ok(frame)
+        });
+        let frames = frames.take_while(|_| !interrupt::is_raised());
+        images_at_once::for_each(&pool, &self.args.limits.limits(), frames, |index, frame| {
+            match frame.and_then(|frame| self.write_one(frame, map)) {
+                Ok(()) => *done.lock().expect("no thread panics here") += 1,
+                Err(error) => {
+                    failed.lock().expect("no thread panics here").insert(index, error);
                 }
-                match image.and_then(|image| self.write_one(image.path(), map)) {
-                    Ok(()) => *done.lock().expect("no thread panics here") += 1,
-                    Err(error) => {
-                        failed.lock().expect("no thread panics here").insert(index, error);
-                    }
-                }
-                bar.inc(1);
-            },
-        );
+            }
+            bar.inc(1);
+        });
         bar.finish_and_clear();
         let done = done.into_inner().expect("no thread panics here");
         let failed = failed.into_inner().expect("no thread panics here");
@@ -269,8 +272,9 @@ impl Pictures<'_> {
         Ok(Made { done, failed })
     }
 
-    fn write_one(&self, image: &Path, map: &PixelMap) -> anyhow::Result<()> {
-        let picture = photograph::read_colours(image, &self.args.limits.limits())?;
+    fn write_one(&self, frame: Frame, map: &PixelMap) -> anyhow::Result<()> {
+        let (image, stem) = (frame.path().to_owned(), frame.stem());
+        let picture = frame.read_colours(&self.args.limits.limits())?;
         let size = [picture.width(), picture.height()];
         ensure!(
             size == [self.camera.width, self.camera.height],
@@ -281,8 +285,8 @@ impl Pictures<'_> {
             self.camera.width,
             self.camera.height
         );
-        let place = self.place(image)?;
-        ensure!(!same_file(&place, image), "{} would be overwritten", image.display());
+        let place = self.place(&stem);
+        ensure!(!same_file(&place, &image), "{} would be overwritten", image.display());
         let mut png = std::io::Cursor::new(Vec::new());
         remapped(&picture, map)
             .write_to(&mut png, image::ImageFormat::Png)
@@ -344,8 +348,16 @@ pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
     let made = Rectification::new(cameras, size, args.view.field).context("--pair")?;
     let folders = names.map(|name| args.view.output.join(name));
     let images = [Images::of(&args.first)?, Images::of(&args.second)?];
+    if let Some(recording) = images.iter().flat_map(Images::named).find(|path| is_recording(path)) {
+        bail!(
+            "{}: rectify reads photographs; write the frames of this recording as images first, for example with \
+             `deltille.frames` in Python",
+            recording.display()
+        );
+    }
     let of_camera = |index: usize| Pictures {
         args: &args.view,
+        options: FrameOptions::default(),
         folder: &folders[index],
         camera: cameras[index].0,
         end: "rectified",

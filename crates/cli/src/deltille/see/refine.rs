@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, anyhow, bail, ensure};
 use clap::ValueEnum;
 use glam::DVec2;
 
@@ -12,9 +12,9 @@ use crate::deltille::files::limits::ImageLimits;
 use crate::output::{self, Overwrite};
 use deltille::detect::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner, Tone};
 use deltille::export::csv;
+use deltille::frames::{Frame, is_recording};
 use deltille::lattice::GridKind;
 use deltille::limits::Limits;
-use deltille::photograph;
 use deltille::raster::AnyGray;
 
 /// Largest number of corners to refine, about as many as in one image.
@@ -23,7 +23,7 @@ const MAX_SEEDS: usize = 20_000;
 /// Arguments of `deltille refine`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Photograph: PNG, JPEG, TIFF, BMP, PGM or WebP
+    /// Photograph: PNG, JPEG, TIFF, BMP, PGM, WebP or HEIC
     #[arg(value_name = "IMAGE")]
     image: PathBuf,
     /// Tiling around the corners
@@ -93,7 +93,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Kind::Checker => GridKind::Checker,
     };
     let refiner = Refiner::new(kind, args.method.into(), args.window).with_tone(args.tone);
-    let refined: Vec<Refined> = match photograph::read_within(&args.image, &limits)? {
+    ensure!(
+        !is_recording(&args.image),
+        "{}: refine reads one photograph; write the frame of this recording as an image first",
+        args.image.display()
+    );
+    let photograph = Frame::photograph(args.image.clone()).read(&limits, false)?;
+    let refined: Vec<Refined> = match photograph.image {
         AnyGray::U8(image) => refiner.refine_all(&image, &seeds),
         AnyGray::U16(image) => refiner.refine_all(&image, &seeds),
     };
