@@ -154,8 +154,8 @@ fn detections_and_calibrations() {
             .to_owned(),
     );
     commands.push(
-        "deltille rig --camera left=@left-seen --camera right=@right-seen --target @board/board.json --format \
-         kalibr,colmap --refine-target -o @rig"
+        "deltille rig --camera left=@left-seen --camera right=@right-seen --target @board/board.json --model radtan \
+         --format kalibr,colmap --refine-target -o @rig"
             .to_owned(),
     );
     check(&commands, 12 * 5 + 10);
