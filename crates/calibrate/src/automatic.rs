@@ -12,7 +12,7 @@ use super::estimate::values::{CameraEstimate, Estimate, ViewEstimate};
 use super::input::calibration::{Calibration, CameraViews};
 use super::input::observation::View;
 use super::input::sample::evenly;
-use super::model::{Model, TRIED};
+use super::model::Model;
 use super::problem::whitening::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
 use deltille_core::statistics::median;
 
@@ -65,11 +65,16 @@ struct Tried {
 }
 
 impl Calibration {
-    /// Selects the model of a camera, and returns the compared candidates. A model that was given for the camera is ignored.
+    /// Selects one of these models for a camera, and returns the compared candidates. A model that was given for the camera is
+    /// ignored.
     ///
     /// # Errors
     /// Returns an error if there are too few views to hold some out, or if no model explains them.
-    pub fn choose_model(&self, camera: usize) -> Result<(Model, Vec<Candidate>), CalibrationError> {
+    pub fn choose_model(
+        &self,
+        camera: usize,
+        among: &[Model],
+    ) -> Result<(Model, Vec<Candidate>), CalibrationError> {
         let views = evenly(&self.cameras[camera].views, MAX_VIEWS);
         let coordinates: usize = views.map(|view: &View| 2 * view.corner_count()).sum();
         let of_fit = coordinates - coordinates / HELD_OUT;
@@ -77,7 +82,7 @@ impl Calibration {
             let is_spline = matches!(model, Model::Spline { .. });
             !is_spline || of_fit >= COORDINATES_A_PARAMETER * parameters(*model)
         };
-        let models: Vec<Model> = TRIED.into_iter().filter(is_enough).collect();
+        let models: Vec<Model> = among.iter().copied().filter(is_enough).collect();
         let candidates = self.tried(camera, &models, MAX_VIEWS)?;
         let chosen = candidates.iter().find(|candidate| candidate.chosen);
         let model = chosen.map(|chosen| chosen.model).ok_or(CalibrationError::NoStart)?;

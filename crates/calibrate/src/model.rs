@@ -190,21 +190,6 @@ const ELSEWHERE: [(Model, &[&str]); 7] = [
     (Model::SPLINE, &["splined-stereographic"]),
 ];
 
-/// The candidates of automatic model selection. Of two equally good models with the same number of parameters, the first is
-/// selected.
-pub(super) const TRIED: [Model; 10] = [
-    Model::Radtan,
-    Model::Eucm,
-    Model::DoubleSphere,
-    Model::Radtan5,
-    Model::KannalaBrandt(TERMS),
-    Model::KannalaBrandt(MORE_TERMS),
-    Model::Rational,
-    Model::Pupil,
-    Model::ThinPrism,
-    Model::SPLINE,
-];
-
 /// The models, each with a description, as a list in a sentence.
 fn listed(said: impl Fn(&Facts) -> &'static str) -> String {
     let model = |facts: &Facts| match said(facts) {
@@ -218,6 +203,21 @@ fn listed(said: impl Fn(&Facts) -> &'static str) -> String {
 impl Model {
     /// A cubic spline with an automatic number of knots.
     pub const SPLINE: Self = Self::Spline { degree: SPLINE_DEGREE, knots: None };
+
+    /// The candidates of automatic model selection. Of two equally good models with the same number of parameters, the first
+    /// is selected.
+    pub const CANDIDATES: [Self; 10] = [
+        Self::Radtan,
+        Self::Eucm,
+        Self::DoubleSphere,
+        Self::Radtan5,
+        Self::KannalaBrandt(TERMS),
+        Self::KannalaBrandt(MORE_TERMS),
+        Self::Rational,
+        Self::Pupil,
+        Self::ThinPrism,
+        Self::SPLINE,
+    ];
 
     /// Returns the models by name; models with a number have the default number.
     pub fn named() -> impl Iterator<Item = (&'static str, Self)> {
@@ -326,7 +326,7 @@ impl Model {
             let is_of_any = *other == Self::KannalaBrandt(TERMS);
             (other.is_perspective() == self.is_perspective() || is_of_any) && *other != Self::SPLINE
         };
-        let of_kind: Vec<Self> = TRIED.into_iter().filter(is_alike).collect();
+        let of_kind: Vec<Self> = Self::CANDIDATES.into_iter().filter(is_alike).collect();
         let own = Some(self).filter(|own| !of_kind.contains(own));
         of_kind.into_iter().chain(own).collect()
     }

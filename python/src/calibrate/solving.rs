@@ -431,7 +431,7 @@ pub fn solve(
         let mut models = vec![Vec::new(); count];
         for (index, tried) in models.iter_mut().enumerate() {
             if model.0.is_none() && calibration.cameras()[index].intrinsics.model().is_some() {
-                let (chosen, candidates) = calibration.choose_model(index)?;
+                let (chosen, candidates) = calibration.choose_model(index, &Model::CANDIDATES)?;
                 calibration.set_intrinsics(index, chosen);
                 *tried = candidates;
             }

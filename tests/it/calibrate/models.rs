@@ -121,7 +121,7 @@ fn chosen(models: &[Model], seeds: std::ops::Range<u64>) -> (usize, usize) {
         for seed in seeds.clone() {
             let truth = any_camera(model, seed);
             let (views, _) = simulated(&truth, 30, 0.7, seed);
-            let (selected, tried) = of(&views, model).choose_model(0).unwrap();
+            let (selected, tried) = of(&views, model).choose_model(0, &Model::CANDIDATES).unwrap();
             let px = |model: Model| {
                 let of_model = tried.iter().find(|candidate| candidate.model == model);
                 of_model.and_then(|candidate| candidate.held_out_px).unwrap_or(f64::INFINITY)

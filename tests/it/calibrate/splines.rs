@@ -86,10 +86,10 @@ fn a_spline_is_no_freer_than_the_lens_requires() {
 #[test]
 fn a_spline_is_selected_if_no_other_model_fits() {
     let (views, _) = simulated(&wavy(5), 90, 0.7, 5);
-    let (model, tried) = of(&views, Model::Radtan).choose_model(0).unwrap();
+    let (model, tried) = of(&views, Model::Radtan).choose_model(0, &Model::CANDIDATES).unwrap();
     assert_eq!(model, Model::SPLINE, "{tried:?}");
     // With few corners it is not even tried.
-    let (_, tried) = of(&views[..20], Model::Radtan).choose_model(0).unwrap();
+    let (_, tried) = of(&views[..20], Model::Radtan).choose_model(0, &Model::CANDIDATES).unwrap();
     assert!(tried.iter().all(|candidate| candidate.model != Model::SPLINE));
 }
 

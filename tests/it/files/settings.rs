@@ -42,7 +42,8 @@ fn foreign_outputs_are_refused_before_anything_is_read() {
     let at = folder.path();
     deltille(at, "board --rows 8 --cols 9 --name board").success();
     let calibrate = "calibrate nowhere --target board.json --model radtan -o";
-    let rig = "rig --camera left=here --camera right=there --target board.json --model radtan --format kalibr -o out";
+    let rig =
+        "rig --camera left=here --camera right=there --target board.json --format kalibr -o out";
     fs::create_dir(at.join("out")).unwrap();
     let mut page = Page::default();
     for (file, text, args) in [

@@ -10,7 +10,7 @@ use super::report_page::check_images;
 use super::sightings::{Sightings, SightingsArgs};
 use super::solving::{
     Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out,
-    projection_uncertainty, sample, without_outliers,
+    projection_uncertainty, richest, sample, without_outliers,
 };
 use crate::deltille::files::camera_file;
 use crate::deltille::files::written::{
@@ -101,7 +101,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let mut calibration = calibration.camera(&stem, views, intrinsics);
     let model = args.model.unwrap_or(ModelChoice::Auto);
-    let tried = model.choose(&mut calibration, 0)?;
+    let tried = model.choose(&mut calibration, 0, &args.candidates())?;
     let listed = chosen(&tried);
     let mut solved = args.solve.solve(calibration, print, vec![tried])?;
     unnamed.iter().for_each(|note| log!("{note}"));
@@ -160,8 +160,15 @@ impl Args {
             let known = camera_file::read_to_keep("--fixed-intrinsics", path)?;
             return Ok((Intrinsics::Known(known.camera), known.calibrated_with));
         }
-        let model = self.model.unwrap_or(ModelChoice::Auto);
-        Ok((Intrinsics::Unknown(model.richest()), Vec::new()))
+        Ok((Intrinsics::Unknown(richest(&self.candidates())), Vec::new()))
+    }
+
+    /// Returns the models that are compared.
+    fn candidates(&self) -> Vec<Model> {
+        let is_supported = |camera: &Camera| {
+            self.files("", camera, &[], &[], &sample_of(calibration::SCHEMA)).1.is_empty()
+        };
+        self.model.unwrap_or(ModelChoice::Auto).candidates(is_supported)
     }
 
     /// Returns the camera in all requested formats, and errors for those that failed; `json` is the complete result.

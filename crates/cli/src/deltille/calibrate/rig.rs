@@ -11,7 +11,7 @@ use super::sightings;
 use super::sightings::{GridArgs, SheetArgs};
 use super::solving::{
     Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out,
-    projection_uncertainty, sample, without_outliers,
+    projection_uncertainty, richest, sample, without_outliers,
 };
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::written::{
@@ -23,7 +23,7 @@ use crate::output::{Overwrite, check_folder, fixed, log, say};
 use crate::run::{FAILED, report};
 use crate::values::format;
 use deltille::calibrate::{
-    Calibration, CameraViews, Estimate, Excluded, Intrinsics, Reference, TargetMap,
+    Calibration, CameraViews, Estimate, Excluded, Intrinsics, Model, Reference, TargetMap,
 };
 use deltille::camera::{Camera, CameraFile, Pose};
 use deltille::detect::{Detection, InkEstimate};
@@ -97,7 +97,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let sheet = args.sheet.read(&limits, &reference.identities(), &printed)?;
     let panels = sightings::panels(&reference, &sheet)?;
-    let cameras = names.iter().map(|name| args.intrinsics(name, &targets));
+    let candidates = args.candidates(&names);
+    let cameras = names.iter().map(|name| args.intrinsics(name, &targets, &candidates));
     let cameras = cameras.collect::<anyhow::Result<Vec<Intrinsics>>>()?;
     args.check_files(&names, &cameras, &printed)?;
     let page = args.solve.page("rig", args.overwrite)?;
@@ -130,7 +131,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let (mut tried, mut text) = (Vec::new(), String::new());
     for (index, Source { name, option, .. }) in sources.iter().enumerate() {
-        let of_camera = args.model.choose(&mut calibration, index);
+        let of_camera = args.model.choose(&mut calibration, index, &candidates);
         let of_camera = of_camera.with_context(|| option.clone())?;
         if !of_camera.is_empty() {
             text += &format!("{name}:\n{}", chosen(&of_camera));
@@ -180,7 +181,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 impl Args {
     /// Returns the intrinsics of a camera.
-    fn intrinsics(&self, name: &str, targets: &[Target]) -> anyhow::Result<Intrinsics> {
+    fn intrinsics(
+        &self,
+        name: &str,
+        targets: &[Target],
+        candidates: &[Model],
+    ) -> anyhow::Result<Intrinsics> {
         let known = of_name(&self.known, name)
             .map(|path| camera_file::read_to_keep("--known", path).map(|file| (path, file)));
         let known = known.transpose()?;
@@ -189,7 +195,17 @@ impl Args {
             camera_file::check_or_note(path, of_file, targets, self.assume_target)?;
         }
         let known = known.map(|(_, file)| Intrinsics::Known(file.camera));
-        Ok(known.unwrap_or(Intrinsics::Unknown(self.model.richest())))
+        Ok(known.unwrap_or(Intrinsics::Unknown(richest(candidates))))
+    }
+
+    /// Returns the models that are compared.
+    fn candidates(&self, names: &[&str]) -> Vec<Model> {
+        self.model.candidates(|camera| {
+            let cameras: Vec<_> =
+                names.iter().map(|&name| (name, camera, Pose::IDENTITY)).collect();
+            let files = self.files(&cameras, &sample_of(rig::SCHEMA), &Estimate::default(), &[]);
+            files.is_ok_and(|(_, refused)| refused.is_empty())
+        })
     }
 
     /// Rejects files that could not be written, before the work starts.

@@ -83,6 +83,9 @@ enum Weighting {
     Covariance,
 }
 
+/// How models are selected, for errors.
+const AUTO: &str = "--model auto tests each model on a third of the views; name a model, such as radtan, if there are few";
+
 /// A model, or automatic selection.
 #[derive(Clone, Copy, PartialEq)]
 pub enum ModelChoice {
@@ -111,12 +114,16 @@ impl FromStr for ModelChoice {
 }
 
 impl ModelChoice {
-    /// Returns the candidate model with the most parameters.
-    pub fn richest(self) -> Model {
-        match self {
-            Self::Auto => Model::ThinPrism,
-            Self::Model(model) => model,
-        }
+    /// Returns the candidates: those of a selection that the requested formats support, or all if they support none of them
+    /// in common.
+    pub fn candidates(self, is_supported: impl Fn(&Camera) -> bool) -> Vec<Model> {
+        let all = match self {
+            Self::Auto => Model::CANDIDATES.to_vec(),
+            Self::Model(model) => return vec![model],
+        };
+        let is_supported = |model: &Model| is_supported(&sample(&Intrinsics::Unknown(*model)));
+        let supported: Vec<Model> = all.iter().copied().filter(is_supported).collect();
+        if supported.is_empty() { all } else { supported }
     }
 
     /// Returns the name as typed on the command line.
@@ -132,14 +139,21 @@ impl ModelChoice {
         self,
         calibration: &mut Calibration,
         camera: usize,
+        candidates: &[Model],
     ) -> anyhow::Result<Vec<Candidate>> {
         let (Self::Auto, Some(_)) = (self, calibration.cameras()[camera].intrinsics.model()) else {
             return Ok(Vec::new());
         };
-        let (model, tried) = calibration.choose_model(camera).context("--model auto")?;
+        let (model, tried) = calibration.choose_model(camera, candidates).context(AUTO)?;
         calibration.set_intrinsics(camera, model);
         Ok(tried)
     }
+}
+
+/// Returns the model with the most parameters, of which the files are planned; a spline only if there is no other.
+pub fn richest(candidates: &[Model]) -> Model {
+    let other = candidates.iter().rev().find(|model| **model != Model::SPLINE);
+    other.copied().unwrap_or(Model::SPLINE)
 }
 
 /// Formats the held-out errors of the candidate models, one per line; empty without candidates.
