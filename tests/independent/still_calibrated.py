@@ -1,14 +1,19 @@
-"""Does `deltille check` answer as often as it states? Simulates a camera, its calibrations, and new views.
+"""Does `deltille check` answer as often as it states? Simulates cameras, their calibrations, and new views.
 
-    python still_calibrated.py path/to/deltille FOLDER [--calibrations 10] [--repeats 200] [--views 1-6]
-                               [--change none|focal|centre|distortion|bend] [--size 1.0] [--only-changed]
+    python still_calibrated.py path/to/deltille FOLDER [--calibrations 400] [--repeats 5] [--views 1-6] [--rig]
+                               [--change none|focal|centre|distortion|bend|pose] [--size 1.0]
+                               [--board 0.1] [--accuracy 0.1] [--other]
 
 calibrates from 30 simulated views each time, and checks `repeats` sets of new views for each calibration. The board
 differs from its description as `--board` says: stretched, bent and with displaced corners, each of standard deviation
-`--board` mm (0.1). Without a change, it counts the answers `changed`. With a change, each set of views is first checked
-unchanged; the camera is then changed by `size` times the change that this check states it would have found, in a random
-direction: along cx and cy, in k1, or as one of three bends; and the answers that find and name it are counted. The projection, the noise and
-the changes are computed here, without the library.
+`--board` mm. `--accuracy` is the value that deltille is given (by default the same); with `--other`, the new views show
+another print. With `--rig`, a second camera sees the board at the same time.
+
+Without a change, it counts the answers `changed`, of which the 95 % interval is printed (Clopper and Pearson 1934).
+With a change, each set of views is first checked unchanged; the camera (the second one of a rig) is then changed by
+`size` times the change that this check states it would have found, in a random direction: along cx and cy, in k1, as
+one of three bends, or of its pose. The answers that find and name it are counted. The projection, the noise and the
+changes are computed here, without the library.
 """
 
 import argparse
@@ -20,12 +25,21 @@ import subprocess
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+from scipy.stats import beta
 
 ROWS, COLS, EDGE_MM = 8, 11, 20.0
 WIDTH, HEIGHT = 1600, 1200
 TRUTH = dict(f=1000.0, cx=803.0, cy=596.0, k=[-0.2, 0.06, 1e-4, -2e-4])
 GRID = ["--grid", "checker", "--rows", str(ROWS), "--cols", str(COLS), "--edge", "20mm"]
-KEYS = {"focal": "focal_length", "centre": "principal_point", "distortion": "distortion", "bend": "board"}
+KEYS = {
+    "focal": "focal_length",
+    "centre": "principal_point",
+    "distortion": "distortion",
+    "bend": "board",
+    "pose": "pose",
+}
+# The second camera of a rig, from the first: a rotation vector and a translation.
+BESIDE = (np.array([0.01, -0.15, 0.02]), np.array([-60.0, 2.0, 5.0]))
 
 
 def rotation(turn):
@@ -69,41 +83,51 @@ def printed(random, size_mm):
     return points + sheets + random.normal(0, size_mm, points.shape) if size_mm > 0 else points
 
 
-def poses(random, count, board):
-    """Views that show the whole board."""
+def poses(random, count, board, eyes):
+    """Views in which every camera sees the whole board."""
     found = []
     while len(found) < count:
         turn = random.uniform([-0.7, -0.7, -0.4], [0.7, 0.7, 0.4]) + 1e-9
         place = random.uniform([-200, -150, 260], [200, 150, 550])
-        pixels = project(TRUTH, seen_from(board, (turn, place)))
-        if (pixels > 20).all() and (pixels < [WIDTH - 20, HEIGHT - 20]).all():
+        seen = np.concatenate([project(TRUTH, seen_from(board, (turn, place), eye)) for eye in eyes])
+        if (seen > 20).all() and (seen < [WIDTH - 20, HEIGHT - 20]).all():
             found.append((turn, place))
     return found
 
 
-def seen_from(board, pose):
+def seen_from(board, pose, eye=None):
     # Rows run upwards on the board and downwards in the image.
-    return (board - plan()[2].mean(0)) * [1, -1, -1] @ rotation(pose[0]).T + pose[1]
+    points = (board - plan()[2].mean(0)) * [1, -1, -1] @ rotation(pose[0]).T + pose[1]
+    return points if eye is None else points @ rotation(eye[0]).T + eye[1]
 
 
-def write(folder, camera, board, views, noises, noise_px):
+def write(folder, cameras, board, views, noises, noise_px):
+    """Writes the detections of every camera (its parameters and its pose) into a folder of its own."""
     shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
     rows, cols, _ = plan()
     cov = [noise_px**2, 0.0, noise_px**2]
-    for index, (pose, noise) in enumerate(zip(views, noises)):
-        pixels = project(camera, seen_from(board, pose)) + noise_px * noise
-        corners = [
-            {"row": int(row), "col": int(col), "id": None, "x": x, "y": y, "cov": cov}
-            for row, col, (x, y) in zip(rows, cols, pixels.tolist())
-        ]
-        grid = {"kind": "checker", "panel": None, "corners": corners, "tags": []}
-        found = {"schema": "deltille/detection/1", "image": f"{index}.png", "width": WIDTH, "height": HEIGHT}
-        (folder / f"{index:03}.json").write_text(json.dumps(found | {"grids": [grid]}))
+    for number, (camera, eye) in enumerate(cameras):
+        (folder / str(number)).mkdir(parents=True)
+        for index, pose in enumerate(views):
+            pixels = project(camera, seen_from(board, pose, eye)) + noise_px * noises[number, index]
+            corners = [
+                {"row": int(row), "col": int(col), "id": None, "x": x, "y": y, "cov": cov}
+                for row, col, (x, y) in zip(rows, cols, pixels.tolist())
+            ]
+            grid = {"kind": "checker", "panel": None, "corners": corners, "tags": []}
+            found = {"schema": "deltille/detection/1", "image": f"{index}.png", "width": WIDTH, "height": HEIGHT}
+            (folder / f"{number}/{index:03}.json").write_text(json.dumps(found | {"grids": [grid]}))
 
 
-def changed(random, camera, board, kind, stated):
-    """The camera and the board after a change of the stated size, in its unit."""
+def named(folder, cameras):
+    """The arguments that name the detections of all cameras."""
+    if len(cameras) == 1:
+        return [folder / "0"]
+    return [part for number in range(len(cameras)) for part in ("--camera", f"camera{number}={folder / str(number)}")]
+
+
+def changed(random, camera, eye, board, views, kind, stated):
+    """The camera, its pose and the board after a change of the stated size, in its unit."""
     camera = dict(camera)
     if kind == "focal":
         camera["f"] *= 1 + random.choice([-1, 1]) * stated / 100
@@ -120,57 +144,89 @@ def changed(random, camera, board, kind, stated):
         moved = (x * x + y * y) * np.stack([x, y]) * camera["f"]
         camera["k"] = list(camera["k"])
         camera["k"][0] += random.choice([-1, 1]) * stated / np.sqrt((moved**2).sum(0).mean())
-    return camera, board
+    elif kind == "pose":
+        # A rotation and a translation; the RMS displacement of the corners is as stated.
+        step = random.normal(0, 1, 6) * [1e-4, 1e-4, 1e-4, 0.05, 0.05, 0.05]
+        moved = moved_by(eye, step)
+        before, after = (
+            np.concatenate([project(camera, seen_from(board, at, one)) for at in views]) for one in (eye, moved)
+        )
+        eye = moved_by(eye, step * stated / np.sqrt(((after - before) ** 2).sum(1).mean()))
+    return camera, eye, board
 
 
-def check(deltille, camera, folder):
-    out = folder.parent / f"{folder.name}.json"
-    done = subprocess.run(
-        [deltille, "check", camera, folder, *GRID, "-o", out, "--force"], capture_output=True, text=True
-    )
-    if done.returncode not in (0, 1, 3):
+def moved_by(eye, step):
+    turned = rotation(step[:3]) @ rotation(eye[0])
+    angle = np.arccos((np.trace(turned) - 1) / 2)
+    axis = np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]])
+    return angle * axis / (2 * np.sin(angle)), eye[1] + step[3:]
+
+
+def run(command, codes):
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode not in codes:
         raise SystemExit(done.stderr)
-    return json.loads(out.read_text())
 
 
 def of_calibration(args, index):
     random = np.random.default_rng([args.seed, index])
     board = printed(random, args.board)
     folder = args.folder / str(index)
-    views = poses(random, 30, board)
-    noises = random.normal(0, 1, (30, ROWS * COLS, 2))
-    write(folder / "calibration", TRUTH, board, views, noises, args.noise)
-    camera = folder / "camera.json"
-    command = [args.deltille, "calibrate", folder / "calibration", *GRID, "--model", "radtan"]
-    done = subprocess.run([*command, "-o", camera.with_suffix(".yaml"), "--force"], capture_output=True, text=True)
-    if done.returncode != 0:
-        raise SystemExit(done.stderr)
+    eyes = [None, BESIDE] if args.rig else [None]
+    cameras = [(TRUTH, eye) for eye in eyes]
+    accuracy = args.board if args.accuracy is None else args.accuracy
+    accuracy = [*GRID, "--board-accuracy", f"{accuracy}mm", "--force"]
+
+    def noise(count):
+        return random.normal(0, 1, (len(eyes), count, ROWS * COLS, 2))
+
+    def check(views):
+        out = folder / "check.json"
+        inputs = named(views, cameras)
+        run([args.deltille, "check", calibration, *inputs, *accuracy, "-o", out], (0, 1, 3))
+        return json.loads(out.read_text())
+
+    views = poses(random, 30, board, eyes)
+    write(folder / "calibration", cameras, board, views, noise(30), args.noise)
+    inputs = [*named(folder / "calibration", cameras), "--model", "radtan", *accuracy]
+    if args.rig:
+        calibration = folder / "rig.json"
+        run([args.deltille, "rig", *inputs, "-o", folder], (0,))
+    else:
+        calibration = folder / "camera.json"
+        run([args.deltille, "calibrate", *inputs, "-o", folder / "camera.yaml"], (0,))
     low, high = map(int, args.views.split("-"))
+    last = "camera1" if args.rig else ""
     counts, stated = collections.Counter(), collections.defaultdict(list)
     for _ in range(args.repeats):
         count = int(random.integers(low, high + 1))
-        views = poses(random, count, board)
-        noises = random.normal(0, 1, (count, ROWS * COLS, 2))
+        views = poses(random, count, board, eyes)
+        noises = noise(count)
         own = printed(random, args.board) if args.other else board
-        write(folder / "check", TRUTH, own, views, noises, args.noise)
-        found = check(args.deltille, camera, folder / "check")
-        of = {test["quantity"]: test["detectable"] for test in found["tests"]}
-        for key, value in of.items():
-            stated[key, count].append(value)
+        write(folder / "check", cameras, own, views, noises, args.noise)
+        found = check(folder / "check")
+        of = {(test["quantity"], test.get("camera", "")): test["detectable"] for test in found["tests"]}
+        for key in KEYS.values():
+            stated[key, count] += [of[name] for name in of if name in ((key, last), (key, ""))]
         if args.change == "none":
             counts[found["answer"]] += 1
+            if found["answer"] == "changed":
+                both = [*found["changed"], *found["or"]]
+                counts["board named"] += any(one["quantity"] == "board" for one in both)
             continue
         key = KEYS[args.change]
-        size = args.size * of[key]
-        after, bent = changed(random, TRUTH, own, args.change, size)
-        write(folder / "check", after, bent, views, noises, args.noise)
-        found = check(args.deltille, camera, folder / "check")
+        name = (key, "" if key == "board" else last)
+        camera, eye, bent = changed(random, *cameras[-1], own, views, args.change, args.size * of[name])
+        write(folder / "check", [*cameras[:-1], (camera, eye)], bent, views, noises, args.noise)
+        found = check(folder / "check")
         counts[found["answer"]] += 1
         if found["answer"] == "changed":
-            named = [*found["changed"], *found["or"]]
-            counts["named alone"] += found["changed"] == [key] and not found["or"]
-            counts["named among"] += key in named
-            counts["misnamed"] += key not in named
+            first = [(one["quantity"], one.get("camera", "")) for one in found["changed"]]
+            either = [(one["quantity"], one.get("camera", "")) for one in found["or"]]
+            counts["named alone"] += first == [name] and not either
+            counts["named among"] += name in first + either
+            counts["misnamed"] += name not in first + either
+    shutil.rmtree(folder)
     return counts, stated
 
 
@@ -178,8 +234,10 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("deltille")
     parser.add_argument("folder", type=pathlib.Path)
-    parser.add_argument("--calibrations", type=int, default=10)
-    parser.add_argument("--repeats", type=int, default=200)
+    parser.add_argument("--calibrations", type=int, default=400)
+    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--rig", action="store_true", help="two cameras")
+    parser.add_argument("--accuracy", type=float, help="standard deviation of the board that deltille assumes, mm")
     parser.add_argument("--views", default="1-6")
     parser.add_argument("--change", choices=["none", *KEYS], default="none")
     parser.add_argument("--size", type=float, default=1.0)
@@ -191,14 +249,17 @@ def main():
     with ThreadPoolExecutor(2) as pool:
         results = list(pool.map(lambda index: of_calibration(args, index), range(args.calibrations)))
     counts = sum((counts for counts, _ in results), collections.Counter())
-    print(f"{args.change} {args.size}: {dict(counts)} of {args.calibrations * args.repeats}")
+    all_ = args.calibrations * args.repeats
+    found = counts["changed"]
+    low, high = (beta.ppf([0.025, 0.975], [found, found + 1], [all_ - found + 1, all_ - found])).tolist()
+    low, high = 0.0 if found == 0 else low, 1.0 if found == all_ else high
+    print(f"{args.change} {args.size}: {dict(counts)} of {all_}; changed: {100 * low:.2f} to {100 * high:.2f} %")
     low, high = map(int, args.views.split("-"))
-    for key in ["focal_length", "principal_point", "distortion", "board"]:
-        medians = [
-            f"{np.median([value for _, stated in results for value in stated[key, count]]):.3f}"
-            for count in range(low, high + 1)
-        ]
-        print(f"  {key}: would have been found, median for {args.views} views: {', '.join(medians)}")
+    for key in KEYS.values():
+        medians = [[v for _, stated in results for v in stated[key, count]] for count in range(low, high + 1)]
+        if any(medians):
+            medians = ", ".join(f"{np.median(of):.3f}" if of else "none" for of in medians)
+            print(f"  {key}: would have been found, median for {args.views} views: {medians}")
 
 
 if __name__ == "__main__":
