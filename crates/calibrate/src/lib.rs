@@ -60,7 +60,7 @@ mod uncertainty;
 pub use adjust::finding::{Finding, Moved, OutlierPattern};
 pub use adjust::lack_of_fit::LackOfFit;
 pub use automatic::Candidate;
-pub use check::answer::{Answer, Check, Missing, Quantity, QuantityTest, Remedial};
+pub use check::answer::{Answer, Check, Missing, Quantity, QuantityTest, Shown, Suspect};
 pub use compare::comparison::{
     CameraMotion, Comparison, ComparisonError, Difference, Region, compare_boards,
 };

@@ -32,6 +32,10 @@ impl Matrix {
         &self.0
     }
 
+    pub(crate) fn into_inner(self) -> DMatrix<f64> {
+        self.0
+    }
+
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.0.nrows()

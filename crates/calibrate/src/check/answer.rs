@@ -4,7 +4,7 @@ use std::fmt;
 
 use deltille_core::setting::Setting::CalibrationWrite;
 
-/// Whether a camera is still as calibrated.
+/// Whether a camera or a rig is still as calibrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Answer {
@@ -40,6 +40,8 @@ pub enum Quantity {
     Distortion,
     /// Stretch, shear and bend of the board: it is bent, or another print.
     Board,
+    /// The pose of the camera on the rig, relative to the first camera.
+    Pose,
     /// The number of pixels in the image.
     Resolution,
     /// The shape of the image: a part of the sensor.
@@ -54,6 +56,7 @@ impl Quantity {
             Self::PrincipalPoint => "principal_point",
             Self::Distortion => "distortion",
             Self::Board => "board",
+            Self::Pose => "pose",
             Self::Resolution => "resolution",
             Self::Crop => "crop",
         }
@@ -78,21 +81,41 @@ impl fmt::Display for Quantity {
             }
             Self::Distortion => "distortion",
             Self::Board => "board (bent, or another print)",
+            Self::Pose => "pose on the rig",
             Self::Resolution => "resolution",
             Self::Crop => "crop",
         })
     }
 }
 
+/// A quantity of a camera.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Suspect {
+    /// Name of the camera; empty for a single camera, and for the board.
+    pub camera: String,
+    /// The quantity.
+    pub quantity: Quantity,
+}
+
+impl fmt::Display for Suspect {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.camera.is_empty() {
+            true => self.quantity.fmt(to),
+            false => write!(to, "{}: {}", self.camera, self.quantity),
+        }
+    }
+}
+
 /// The test of one quantity.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct QuantityTest {
     /// The quantity.
-    pub quantity: Quantity,
+    pub of: Suspect,
     /// The estimated change if nothing else changed, in the unit of the quantity: a signed percentage for the focal
     /// length; the length of the shift of the principal point; the RMS displacement in the calibrated part of the image
-    /// for distortion; the RMS displacement of corners for the board.
+    /// for distortion; the RMS displacement of corners for the board; the RMS displacement of the detected corners in
+    /// the image for the pose.
     pub change: f64,
     /// Probability that an unchanged camera and board show at least this change.
     pub p_value: f64,
@@ -109,42 +132,61 @@ impl QuantityTest {
     }
 }
 
-/// How to determine a quantity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// How the views show the board.
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Remedial {
-    /// The board is seen head-on in all views.
-    Tilt,
-    /// The corners cover only the central part of the image.
-    Spread,
-    /// Neither: more views are needed.
-    More,
+pub struct Shown {
+    /// The largest angle between the line of sight and the normal of a panel, degrees.
+    pub tilt_deg: f64,
+    /// The largest distance of a corner from the image centre, in half diagonals of the image.
+    pub reach: f64,
 }
 
-impl fmt::Display for Remedial {
+/// The largest tilt with which the distance of the board is hardly distinguishable from a focal length, degrees.
+const HEAD_ON_DEG: f64 = 15.0;
+
+/// The reach in half diagonals below which corners do not show the outer half of the image's area.
+const CENTRAL: f64 = 0.7;
+
+/// The remedy for the most limiting property of the views.
+impl fmt::Display for Shown {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        to.write_str(match self {
-            Self::Tilt => "the board is seen head-on: tilt it by 30° or more",
-            Self::Spread => {
-                "there are corners only in the central part of the image: place the board near its borders"
-            }
-            Self::More => "take more photographs, with the board large and tilted",
-        })
+        if self.tilt_deg < HEAD_ON_DEG {
+            return write!(
+                to,
+                "the board is tilted by at most {:.0}°: tilt it by 30° or more, about different axes",
+                self.tilt_deg
+            );
+        }
+        if self.reach < CENTRAL {
+            return write!(
+                to,
+                "the corners reach only {:.0} % of the distance from the image centre to its corners: place the board \
+                 near the borders, too",
+                100.0 * self.reach
+            );
+        }
+        to.write_str("take more photographs, with the board large and tilted")
     }
 }
 
 /// Why a check has no answer.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Missing {
     /// The calibration has no covariance.
     Covariance,
-    /// The calibration has no observed covariance, because it has too few views.
+    /// The calibration has no observed covariance, because it has too few views or was written by an earlier version.
     Observed,
     /// The lens is a spline, whose knots are not separate quantities.
     Spline,
-    /// No view shows enough of the target.
-    Views,
+    /// No view of a camera shows enough of the target.
+    Views {
+        /// Name of the camera; empty for a single camera.
+        camera: String,
+    },
+    /// Too few views of several cameras at the same time relate the cameras to each other.
+    Link,
     /// Neither the camera nor a changed camera fits the views.
     Fit {
         /// RMS residual of the best fit per axis, px.
@@ -153,13 +195,13 @@ pub enum Missing {
     /// The views would hardly show a change of this quantity.
     Undetermined {
         /// The quantity.
-        quantity: Quantity,
+        of: Suspect,
         /// The change that would have been found.
         detectable: f64,
         /// The largest useful value of it.
         limit: f64,
-        /// The remedy.
-        remedy: Remedial,
+        /// How the views of this camera show the board.
+        shown: Shown,
     },
 }
 
@@ -170,7 +212,8 @@ impl Missing {
             Self::Covariance => "covariance",
             Self::Observed => "observed_covariance",
             Self::Spline => "spline",
-            Self::Views => "views",
+            Self::Views { .. } => "views",
+            Self::Link => "link",
             Self::Fit { .. } => "fit",
             Self::Undetermined { .. } => "undetermined",
         }
@@ -186,23 +229,32 @@ impl fmt::Display for Missing {
                  intrinsics"
             ),
             Self::Observed => to.write_str(
-                "the camera was calibrated with too few views for an observed covariance: calibrate with 10 views or more",
+                "the calibration has no observed covariance: calibrate again, with 10 views or more",
             ),
             Self::Spline => to.write_str(
                 "the camera model is a spline, which has no focal length and principal point to test: use a parametric model",
             ),
-            Self::Views => to.write_str("no photograph shows enough corners of the target"),
+            Self::Views { camera } if camera.is_empty() => {
+                to.write_str("no photograph shows enough corners of the target")
+            }
+            Self::Views { camera } => {
+                write!(to, "no photograph of {camera} shows enough corners of the target")
+            }
+            Self::Link => to.write_str(
+                "the photographs do not relate all cameras to each other: photograph the board with all cameras at three \
+                 times or more, and give photographs of the same time the same file name",
+            ),
             Self::Fit { rms_px } => write!(
                 to,
                 "neither the camera nor a changed camera fits the photographs (RMS {rms_px:.2} px): check the target and the \
                  camera file"
             ),
-            Self::Undetermined { quantity, detectable, limit, remedy } => {
-                let unit = quantity.unit();
-                let name = match quantity {
-                    Quantity::FocalLength => "focal length",
-                    Quantity::PrincipalPoint => "principal point",
-                    _ => "distortion",
+            Self::Undetermined { of, detectable, limit, shown } => {
+                let unit = of.quantity.unit();
+                let name = of.quantity.name().replace('_', " ");
+                let camera = match of.camera.as_str() {
+                    "" => String::new(),
+                    camera => format!(" of {camera}"),
                 };
                 let far = match detectable.is_finite() && *detectable < 1e3 * limit {
                     true => format!("{detectable:.2} {unit}"),
@@ -210,7 +262,8 @@ impl fmt::Display for Missing {
                 };
                 write!(
                     to,
-                    "a change of the {name} of {far} could go unnoticed (at most {limit:.2} {unit} is useful): {remedy}"
+                    "a change of the {name}{camera} of {far} could go unnoticed (at most {limit:.2} {unit} is useful): \
+                     {shown}"
                 )
             }
         }
@@ -224,9 +277,9 @@ pub struct Check {
     /// The answer.
     pub answer: Answer,
     /// What has changed: these quantities together. Empty if nothing has.
-    pub changed: Vec<Quantity>,
+    pub changed: Vec<Suspect>,
     /// Other quantities, each alone explaining the views as well as [`changed`](Self::changed).
-    pub or: Vec<Quantity>,
+    pub or: Vec<Suspect>,
     /// Why there is no answer.
     pub missing: Vec<Missing>,
     /// The tests of single quantities.
@@ -239,6 +292,6 @@ pub struct Check {
     pub corners: usize,
     /// RMS residual of the best fit per axis, px.
     pub rms_px: f64,
-    /// Image size of the camera and of the views, px.
+    /// Image size of the camera and of its views, px: of the first camera for which they differ, else of the first.
     pub sizes_px: [[u32; 2]; 2],
 }

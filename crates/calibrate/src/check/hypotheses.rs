@@ -9,9 +9,13 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::answer::{Quantity, QuantityTest};
-use super::equations::{Earlier, Equations};
+use super::answer::{Quantity, QuantityTest, Suspect};
+use super::earlier::{Earlier, Unknown};
+use super::equations::Equations;
+use super::views::Views;
 use crate::estimate::coverage::Coverage;
+use crate::estimate::values::CameraEstimate;
+use crate::problem::bundle::Problem;
 use crate::uncertainty::projection::{by_motion, by_parameters, seen_at};
 use deltille_core::camera::PROJECTION_PARAMETERS;
 use deltille_core::statistics::f_p_value;
@@ -35,7 +39,7 @@ const DETERMINED: f64 = 1e-6;
 
 /// The evidence on all quantities.
 pub(super) struct Evidence {
-    quantities: Vec<(Quantity, Vec<usize>)>,
+    quantities: Vec<(Suspect, Vec<usize>)>,
     matrix: DMatrix<f64>,
     score: DVector<f64>,
     /// ν.
@@ -44,41 +48,49 @@ pub(super) struct Evidence {
 
 impl Evidence {
     /// Forms the evidence; `None` if the equations cannot be solved.
-    pub(super) fn of(equations: &Equations, earlier: &Earlier, freedom: f64) -> Option<Self> {
+    pub(super) fn of(equations: &Equations, earlier: &Earlier) -> Option<Self> {
         let mut directions: Vec<DVector<f64>> = Vec::new();
         let mut quantities = Vec::new();
-        let mut push = |quantity, columns: Vec<DVector<f64>>| {
+        let mut push = |of: Suspect, columns: Vec<DVector<f64>>| {
             if !columns.is_empty() {
                 let first = directions.len();
-                quantities.push((quantity, (first..first + columns.len()).collect()));
+                quantities.push((of, (first..first + columns.len()).collect()));
                 directions.extend(columns);
             }
         };
-        let focal_px = earlier.camera.camera.focal_px.to_array();
-        let mut focal = DVector::zeros(equations.count());
-        let (mut centre, mut lens) = (Vec::new(), Vec::new());
-        for (column, &parameter) in equations.free.iter().enumerate() {
-            let mut unit = DVector::zeros(equations.count());
-            unit[column] = 1.0;
-            match parameter {
-                0 | 1 => focal[column] = focal_px[parameter],
-                2 | 3 => centre.push(unit),
-                _ => lens.push(unit),
+        for (camera, known) in earlier.cameras.iter().enumerate() {
+            let focal_px = known.camera.focal_px.to_array();
+            let mut focal = DVector::zeros(equations.count());
+            let (mut centre, mut lens, mut pose) = (Vec::new(), Vec::new(), Vec::new());
+            for (column, unknown) in earlier.unknowns.iter().enumerate() {
+                let mut unit = DVector::zeros(equations.count());
+                unit[column] = 1.0;
+                match *unknown {
+                    Unknown::Parameter { camera: of, index } if of == camera => match index {
+                        0 | 1 => focal[column] = focal_px[index],
+                        2 | 3 => centre.push(unit),
+                        _ => lens.push(unit),
+                    },
+                    Unknown::Pose { camera: of } if of == camera => pose.push(unit),
+                    _ => {}
+                }
             }
+            let of = |quantity| Suspect { camera: known.name.clone(), quantity };
+            let focal = if focal.amax() > 0.0 { vec![focal] } else { Vec::new() };
+            push(of(Quantity::FocalLength), focal);
+            push(of(Quantity::PrincipalPoint), centre);
+            push(of(Quantity::Distortion), lens);
+            push(of(Quantity::Pose), pose);
         }
-        if focal.amax() > 0.0 {
-            push(Quantity::FocalLength, vec![focal]);
-        }
-        push(Quantity::PrincipalPoint, centre);
-        push(Quantity::Distortion, lens);
         let of_sheet = equations.sheet.iter().map(|&column| {
             let mut unit = DVector::zeros(equations.count());
             unit[column] = 1.0;
             unit
         });
-        push(Quantity::Board, of_sheet.collect());
+        let board = Suspect { camera: String::new(), quantity: Quantity::Board };
+        push(board, of_sheet.collect());
         let (matrix, score) = equations.information(&DMatrix::from_columns(&directions))?;
-        Some(Self { quantities, matrix, score, freedom })
+        Some(Self { quantities, matrix, score, freedom: earlier.freedom })
     }
 
     /// The statistic of some directions and its degrees of freedom.
@@ -106,18 +118,18 @@ impl Evidence {
     }
 
     /// The directions of some quantities together.
-    fn directions(&self, of: &[Quantity]) -> Vec<usize> {
-        let chosen = self.quantities.iter().filter(|(quantity, _)| of.contains(quantity));
+    fn directions(&self, of: &[Suspect]) -> Vec<usize> {
+        let chosen = self.quantities.iter().filter(|(own, _)| of.contains(own));
         chosen.flat_map(|(_, columns)| columns.iter().copied()).collect()
     }
 
-    fn all(&self) -> Vec<Quantity> {
-        self.quantities.iter().map(|(quantity, _)| *quantity).collect()
+    fn all(&self) -> Vec<Suspect> {
+        self.quantities.iter().map(|(of, _)| of.clone()).collect()
     }
 
     /// The p-value of the change of some quantities, if some others have changed.
-    fn p_value_beside(&self, of: &[Quantity], others: &[Quantity]) -> f64 {
-        let both: Vec<Quantity> = of.iter().chain(others).copied().collect();
+    fn p_value_beside(&self, of: &[Suspect], others: &[Suspect]) -> f64 {
+        let both = [of, others].concat();
         let (all, all_freedom) = self.statistic(&self.directions(&both));
         let (less, less_freedom) = self.statistic(&self.directions(others));
         let more = all_freedom - less_freedom;
@@ -138,55 +150,61 @@ impl Evidence {
     }
 
     /// What has changed, and what explains the views as well.
-    pub(super) fn changed(&self) -> (Vec<Quantity>, Vec<Quantity>) {
-        let alone = |&quantity: &Quantity| self.p_value_beside(&[quantity], &[]);
+    pub(super) fn changed(&self) -> (Vec<Suspect>, Vec<Suspect>) {
+        let alone = |of: &Suspect| self.p_value_beside(std::slice::from_ref(of), &[]);
         let is_any = self.all().iter().map(alone).fold(1.0, f64::min) < self.level();
         if !is_any {
             return (Vec::new(), Vec::new());
         }
-        let mut changed = Vec::new();
+        let mut changed: Vec<Suspect> = Vec::new();
         let mut left = self.all();
         loop {
-            let beside = |&quantity: &Quantity| self.p_value_beside(&[quantity], &changed);
-            let statistic = |&quantity: &Quantity| {
-                let with: Vec<Quantity> = changed.iter().copied().chain([quantity]).collect();
+            let beside = |of: &Suspect| self.p_value_beside(std::slice::from_ref(of), &changed);
+            let statistic = |of: &Suspect| {
+                let with = [&changed[..], std::slice::from_ref(of)].concat();
                 self.statistic(&self.directions(&with)).0
             };
-            let order = |one: &Quantity, other: &Quantity| {
+            let order = |one: &Suspect, other: &Suspect| {
                 // Tiny probabilities are equal; then the statistics decide.
-                let of = |quantity| beside(quantity).max(f64::MIN_POSITIVE);
+                let of = |of| beside(of).max(f64::MIN_POSITIVE);
                 of(one).total_cmp(&of(other)).then(statistic(other).total_cmp(&statistic(one)))
             };
-            let Some(best) = left.iter().copied().min_by(order) else { break };
-            left.retain(|quantity| *quantity != best);
+            let Some(best) = left.iter().min_by(|one, other| order(one, other)).cloned() else {
+                break;
+            };
+            left.retain(|of| *of != best);
             changed.push(best);
             if self.p_value_beside(&left, &changed) >= FALSE_ALARM {
                 break;
             }
         }
-        let explains = |&quantity: &Quantity| {
+        let explains = |of: &Suspect| {
             changed.len() == 1
-                && alone(&quantity) < REJECTED
-                && self.p_value_beside(&changed, &[quantity]) >= REJECTED
+                && alone(of) < REJECTED
+                && self.p_value_beside(&changed, std::slice::from_ref(of)) >= REJECTED
         };
-        let or = left.iter().copied().filter(explains).collect();
+        let or = left.iter().filter(|of| explains(of)).cloned().collect();
         (changed, or)
     }
 
     /// The tests of single quantities.
-    pub(super) fn tests(&self, equations: &Equations, earlier: &Earlier) -> Vec<QuantityTest> {
-        let camera = &earlier.camera.camera;
-        let side_px = f64::from(camera.width.max(camera.height));
-        let test = |(quantity, columns): &(Quantity, Vec<usize>)| {
+    pub(super) fn tests(
+        &self,
+        equations: &Equations,
+        earlier: &Earlier,
+        views: &Views,
+    ) -> Vec<QuantityTest> {
+        let test = |(of, columns): &(Suspect, Vec<usize>)| {
             let (matrix, score) = self.part(columns);
             let n = columns.len();
+            let camera = earlier.cameras.iter().position(|camera| camera.name == of.camera);
+            let known = &earlier.cameras[camera.unwrap_or(0)];
+            let side_px = f64::from(known.camera.width.max(known.camera.height));
             // The squared size of a change is its product with this matrix.
-            let (size, limit) = match quantity {
+            let (size, limit) = match of.quantity {
                 Quantity::FocalLength => (DMatrix::from_element(1, 1, 1e4), Some(200.0 * USEFUL)),
-                Quantity::Distortion => {
-                    let free = PROJECTION_PARAMETERS.len();
-                    (displacement(earlier, &equations.free, free)?, Some(USEFUL * side_px))
-                }
+                Quantity::Distortion => (displacement(known)?, Some(USEFUL * side_px)),
+                Quantity::Pose => (by_pose(&views.problem, camera?), Some(USEFUL * side_px)),
                 Quantity::Board => {
                     (DMatrix::identity(n, n) * (equations.board_mm.powi(2) / 3.0), None)
                 }
@@ -197,9 +215,9 @@ impl Evidence {
             let length = change.dot(&(&size * &change)).max(0.0).sqrt();
             let visible = detectable(self.statistic(columns).1, self.freedom, self.level());
             Some(QuantityTest {
-                quantity: *quantity,
+                of: of.clone(),
                 change: sign * length,
-                p_value: self.p_value_beside(&[*quantity], &[]),
+                p_value: self.p_value_beside(std::slice::from_ref(of), &[]),
                 detectable: (visible * largest(&matrix, &size)).sqrt(),
                 limit,
             })
@@ -233,17 +251,40 @@ fn largest(matrix: &DMatrix<f64>, size: &DMatrix<f64>) -> f64 {
 
 /// The mean square of the displacement of points at infinity by a change of the lens, over the calibrated part of the
 /// image and after the motion of the scene that best compensates it.
-fn displacement(earlier: &Earlier, free: &[usize], first: usize) -> Option<DMatrix<f64>> {
-    let camera = earlier.camera;
+fn displacement(camera: &CameraEstimate) -> Option<DMatrix<f64>> {
     let alignment = camera.projection.as_ref()?.alignment.inner();
-    let lens: Vec<usize> = (0..free.len()).filter(|&i| free[i] >= first).collect();
-    let mut sum = DMatrix::zeros(lens.len(), lens.len());
-    let mut count = 0.0;
-    for (pixel, _) in Coverage::of(camera).places(camera.size_px()) {
-        let Some(point) = seen_at(&camera.camera, pixel, None) else { continue };
-        let Some(at) = camera.camera.project_with_derivatives(point) else { continue };
-        let rows = by_parameters(&at, free) + by_motion(&at, point) * alignment;
-        let rows = DMatrix::from_fn(2, lens.len(), |i, j| rows[(i, lens[j])]);
+    let free = camera.free();
+    let lens: Vec<usize> =
+        (0..free.len()).filter(|&i| free[i] >= PROJECTION_PARAMETERS.len()).collect();
+    let coverage = Coverage::of(camera);
+    let derivatives = coverage.places(camera.size_px()).filter_map(|(pixel, _)| {
+        let point = seen_at(&camera.camera, pixel, None)?;
+        let at = camera.camera.project_with_derivatives(point)?;
+        let rows = by_parameters(&at, &free) + by_motion(&at, point) * alignment;
+        Some(DMatrix::from_fn(2, lens.len(), |i, j| rows[(i, lens[j])]))
+    });
+    mean_square(lens.len(), derivatives)
+}
+
+/// The mean square of the displacement of the detected corners by a change of the pose of a camera.
+fn by_pose(problem: &Problem, camera: usize) -> DMatrix<f64> {
+    let lens = &problem.cameras[camera].camera;
+    let from_rig = problem.cameras[camera].camera_from_rig.translation;
+    let blocks = problem.blocks.iter().filter(|block| block.camera == camera);
+    let derivatives = blocks.flat_map(|block| problem.camera_points(block)).filter_map(|point| {
+        let at = lens.project_with_derivatives(point)?;
+        // The rotation of `camera_from_rig` turns the vector from the camera's position on the rig.
+        let mut rows = by_motion(&at, point - from_rig);
+        rows.fixed_columns_mut::<3>(3).copy_from(&by_motion(&at, point).fixed_columns::<3>(3));
+        Some(DMatrix::from_fn(2, 6, |i, j| rows[(i, j)]))
+    });
+    mean_square(6, derivatives).unwrap_or_else(|| DMatrix::zeros(6, 6))
+}
+
+/// The mean of DᵀD over derivatives D of displacements; `None` without any.
+fn mean_square(n: usize, derivatives: impl Iterator<Item = DMatrix<f64>>) -> Option<DMatrix<f64>> {
+    let (mut sum, mut count) = (DMatrix::zeros(n, n), 0.0);
+    for rows in derivatives {
         sum += rows.tr_mul(&rows);
         count += 1.0;
     }

@@ -1,97 +1,79 @@
 //! From new views to an answer.
 
-use super::answer::{Answer, Check, Missing, Quantity, QuantityTest, Remedial};
-use super::equations::{Earlier, Equations, SAME_BOARD};
+use super::answer::{Answer, Check, Missing, Quantity, QuantityTest, Suspect};
+use super::earlier::Earlier;
+use super::equations::Equations;
 use super::hypotheses::Evidence;
+use super::views::Views;
 use crate::estimate::values::Estimate;
 use crate::input::calibration::Calibration;
-use crate::problem::bundle::Problem;
-use crate::problem::camera_prior::CameraPrior;
-use crate::problem::unknowns::Block;
-use deltille_core::camera::Lens;
-use glam::DVec3;
-
-/// The largest angle between the line of sight and the normal of a board that counts as head-on, degrees.
-const HEAD_ON_DEG: f64 = 15.0;
-
-/// The reach of the corners from the image centre that counts as central, in half diagonals.
-const CENTRAL: f64 = 0.6;
 
 /// Largest RMS residual of the best fit, relative to the longer side of the image.
 const FITS: f64 = 0.005;
 
 impl Calibration {
-    /// Tests whether a camera is still as in an earlier estimate, from the views of the only camera of this calibration;
-    /// their intrinsics are ignored. The board is assumed to be as accurate as
-    /// [`board_accuracy_mm`](Self::board_accuracy_mm) says.
+    /// Tests whether the cameras are still as in an earlier estimate of the same cameras in the same order. Of this
+    /// calibration, the views, the panels and [`board_accuracy_mm`](Self::board_accuracy_mm) are used; intrinsics are
+    /// ignored. Views of several cameras that were taken at the same time have the same name.
     pub fn check(&self, before: &Estimate) -> Check {
-        let Some(camera) = before.cameras.first() else { return undecided(Missing::Covariance) };
-        let size_px = [camera.camera.width, camera.camera.height];
-        let views = || self.cameras.iter().flat_map(|camera| &camera.views);
-        let Some(view) = views().next() else { return undecided(Missing::Views) };
-        let mut check = Check { sizes_px: [size_px, view.size_px], ..undecided(Missing::Views) };
-        if view.size_px != size_px {
-            check.missing.clear();
-            (check.answer, check.changed) =
-                (Answer::Changed, vec![of_sizes(size_px, view.size_px)]);
-            return check;
+        let sizes = before.cameras.iter().zip(&self.cameras).filter_map(|(known, of)| {
+            let size_px = [known.camera.width, known.camera.height];
+            Some((&known.name, size_px, of.views.first()?.size_px))
+        });
+        let sizes: Vec<_> = sizes.collect();
+        let is_other = |of: &&(_, [u32; 2], [u32; 2])| of.1 != of.2;
+        let first = sizes.iter().find(is_other).or(sizes.first());
+        let sizes_px = first.map_or([[0; 2]; 2], |&(_, known, of)| [known, of]);
+        let check = Check { sizes_px, ..undecided(Vec::new()) };
+        let changed = sizes.iter().filter(is_other).map(|&(camera, known, of)| Suspect {
+            camera: camera.clone(),
+            quantity: of_sizes(known, of),
+        });
+        let changed: Vec<Suspect> = changed.collect();
+        if !changed.is_empty() {
+            return Check { answer: Answer::Changed, changed, ..check };
         }
-        if let Lens::Spline(_) = camera.camera.lens {
-            return Check { missing: vec![Missing::Spline], ..check };
+        let earlier = Earlier::of(before);
+        match earlier.and_then(|earlier| Ok((Views::of(self, &earlier)?, earlier))) {
+            Ok((views, earlier)) => answer(&views, &earlier, self.board_accuracy_mm, check),
+            Err(missing) => Check { missing: vec![missing], ..check },
         }
-        let noise = camera.covariance.inner();
-        let observed = camera.projection.as_ref().and_then(|known| known.observed.as_ref());
-        let of_noise = match noise.is_empty() {
-            true => None,
-            false => CameraPrior::new(&camera.camera, noise),
-        };
-        let (Some(of_noise), Some(observed)) = (of_noise, observed) else {
-            let missing = if noise.is_empty() { Missing::Covariance } else { Missing::Observed };
-            return Check { missing: vec![missing], ..check };
-        };
-        let scatter = observed.without_board();
-        let excess = of_noise.information().component_mul(scatter.inner()).sum();
-        let excess = (excess / noise.nrows() as f64).max(1.0);
-        // With few frames, single directions of the scatter are too uncertain.
-        let mut covariance = scatter.inner() + noise * excess;
-        if let Some(of_board) = &observed.of_board {
-            covariance += of_board.inner() * SAME_BOARD;
-        }
-        let earlier =
-            Earlier { camera, covariance: &covariance, excess, common_px: before.common_px };
-        let Some(equations) = Equations::of(self, &earlier) else { return check };
-        let side_px = f64::from(size_px[0].max(size_px[1]));
-        check.views = equations.problem.frames.len();
-        check.corners = equations.problem.count();
-        check.rms_px = equations.rms_px;
-        if check.rms_px > FITS * side_px {
-            return Check { missing: vec![Missing::Fit { rms_px: check.rms_px }], ..check };
-        }
-        let Some(evidence) = Evidence::of(&equations, &earlier, observed.freedom) else {
-            return check;
-        };
-        check.tests = evidence.tests(&equations, &earlier);
-        check.p_value = Some(evidence.p_value());
-        (check.changed, check.or) = evidence.changed();
-        let remedy = remedy(&equations.problem);
-        let open = check.tests.iter().filter(|test| !test.is_determined());
-        check.missing = open.map(|test| undetermined(test, remedy)).collect();
-        check.answer = match (check.changed.is_empty(), check.missing.is_empty()) {
-            (false, _) => Answer::Changed,
-            (true, true) => Answer::Unchanged,
-            (true, false) => Answer::CannotTell,
-        };
-        check
     }
 }
 
-/// A check that has no answer for one reason.
-fn undecided(missing: Missing) -> Check {
+/// The answer from the equations of the views.
+fn answer(views: &Views, earlier: &Earlier, board_accuracy_mm: Option<f64>, check: Check) -> Check {
+    let (rms_px, problem) = (views.rms_px, &views.problem);
+    let check = Check { views: views.count, corners: problem.count(), rms_px, ..check };
+    let sides = earlier.cameras.iter().map(|of| of.camera.width.max(of.camera.height));
+    if rms_px > FITS * f64::from(sides.max().unwrap_or(0)) {
+        return Check { missing: vec![Missing::Fit { rms_px }], ..check };
+    }
+    let equations = Equations::of(views, earlier, board_accuracy_mm);
+    let found = equations.and_then(|of| Some((Evidence::of(&of, earlier)?, of)));
+    let Some((evidence, equations)) = found else {
+        return Check { missing: vec![Missing::Views { camera: String::new() }], ..check };
+    };
+    let tests = evidence.tests(&equations, earlier, views);
+    let p_value = Some(evidence.p_value());
+    let (changed, or) = evidence.changed();
+    let missing = tests.iter().filter(|test| !test.is_determined());
+    let missing: Vec<Missing> = missing.map(|test| undetermined(test, views, earlier)).collect();
+    let answer = match (changed.is_empty(), missing.is_empty()) {
+        (false, _) => Answer::Changed,
+        (true, true) => Answer::Unchanged,
+        (true, false) => Answer::CannotTell,
+    };
+    Check { answer, changed, or, missing, tests, p_value, ..check }
+}
+
+/// A check that has no answer.
+fn undecided(missing: Vec<Missing>) -> Check {
     Check {
         answer: Answer::CannotTell,
         changed: Vec::new(),
         or: Vec::new(),
-        missing: vec![missing],
+        missing,
         tests: Vec::new(),
         p_value: None,
         views: 0,
@@ -110,34 +92,12 @@ fn of_sizes(from: [u32; 2], to: [u32; 2]) -> Quantity {
     }
 }
 
-fn undetermined(test: &QuantityTest, remedy: Remedial) -> Missing {
+fn undetermined(test: &QuantityTest, views: &Views, earlier: &Earlier) -> Missing {
+    let camera = earlier.cameras.iter().position(|camera| camera.name == test.of.camera);
     Missing::Undetermined {
-        quantity: test.quantity,
+        of: test.of.clone(),
         detectable: test.detectable,
         limit: test.limit.unwrap_or(f64::INFINITY),
-        remedy,
-    }
-}
-
-/// How to determine more of the camera than these views do.
-fn remedy(problem: &Problem) -> Remedial {
-    let camera = &problem.cameras[0].camera;
-    let size = glam::DVec2::new(camera.width.into(), camera.height.into());
-    let tilt = |block: &Block| {
-        let pose = problem.frames[block.frame].after(&problem.scene_from_panel(block.panel));
-        let points: Vec<DVec3> = problem.camera_points(block).collect();
-        let middle = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
-        let cosine = (pose.rotation * DVec3::Z).dot(middle.normalize_or(DVec3::Z)).abs();
-        cosine.min(1.0).acos().to_degrees()
-    };
-    let most = problem.blocks.iter().map(tilt).fold(0.0, f64::max);
-    let corners = problem.blocks.iter().flat_map(|block| block.observations.iter());
-    let reach = corners
-        .map(|seen| (seen.pixel - (size - 1.0) / 2.0).length() / (0.5 * size.length()))
-        .fold(0.0, f64::max);
-    match (most < HEAD_ON_DEG, reach < CENTRAL) {
-        (true, _) => Remedial::Tilt,
-        (false, true) => Remedial::Spread,
-        (false, false) => Remedial::More,
+        shown: views.shown(camera.unwrap_or(0)),
     }
 }

@@ -30,7 +30,7 @@ use crate::uncertainty::information::known_so_far;
 use crate::uncertainty::projection::{ObservedCovariance, ProjectionUncertainty};
 use crate::uncertainty::split_halves;
 use crate::uncertainty::state_equations::StateEquations;
-use deltille_core::camera::PROJECTION_PARAMETERS;
+use deltille_core::camera::{Lens, PROJECTION_PARAMETERS};
 
 impl Estimate {
     /// Assembles the estimate; `frames` are those of the settled problem, `found` are its covariances if they are
@@ -87,6 +87,7 @@ impl Estimate {
             camera
         });
         let cameras: Vec<CameraEstimate> = cameras.collect();
+        let joint = joint(&cameras, settled, observed.as_ref());
         let panels = problem.panels.iter().zip(&layout.panels).map(|(panel, first)| PanelPrior {
             target_from_panel: panel.target_from_panel,
             covariance: first.map(|first| {
@@ -105,6 +106,7 @@ impl Estimate {
             frames: frame_estimates(&cameras, frames, problem, &found, variance),
             targets: targets.collect(),
             panels: panels.collect(),
+            joint,
             shape: board_shape(minimum, &covariance, f_ratio),
             map: target_map(settled, &found.corners, variance, loss, drawn.as_ref()),
             rms_px: rms_px(cameras.iter().flat_map(CameraEstimate::corners)),
@@ -264,24 +266,61 @@ fn projection(
     if columns.is_empty() {
         return None;
     }
-    let observed = observed.map(|Observed { covariance, of_board, freedom }| {
-        let n = columns.len();
-        let own =
-            |of: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, j| of[(columns[i].1, columns[j].1)]);
-        let covariance = match state {
-            Some(state) => split_halves::raised(
-                state,
-                &camera.camera,
-                own(covariance),
-                camera.covariance.inner(),
-            ),
-            None => own(covariance),
-        };
-        let of_board = of_board.as_ref().map(|of| Matrix::new(own(of)));
-        ObservedCovariance { covariance: Matrix::new(covariance), of_board, freedom: *freedom }
+    let observed = observed.map(|observed| {
+        let columns: Vec<usize> = columns.iter().map(|(_, column)| *column).collect();
+        let mut own = observed_of(observed, &columns);
+        if let Some(state) = state {
+            let noise = camera.covariance.inner();
+            let raised =
+                split_halves::raised(state, &camera.camera, own.covariance.into_inner(), noise);
+            own.covariance = Matrix::new(raised);
+        }
+        own
     });
     let (whitening, free) = (&settled.whitening, camera.free());
     ProjectionUncertainty::of(problem, whitening, index, &free, distances_mm, observed)
+}
+
+/// The part of an observed covariance that belongs to some columns.
+fn observed_of(observed: &Observed, columns: &[usize]) -> ObservedCovariance {
+    let n = columns.len();
+    let own = |of: &DMatrix<f64>| Matrix::from_fn(n, n, |i, j| of[(columns[i], columns[j])]);
+    let covariance = own(&observed.covariance);
+    let of_board = observed.of_board.as_ref().map(own);
+    ObservedCovariance { covariance, of_board, freedom: observed.freedom }
+}
+
+/// The observed covariance of all cameras together; `None` for a single camera, or with splines.
+fn joint(
+    cameras: &[CameraEstimate],
+    settled: &Settled,
+    observed: Option<&Observed>,
+) -> Option<ObservedCovariance> {
+    let is_spline = |camera: &CameraEstimate| matches!(camera.camera.lens, Lens::Spline(_));
+    let observed = observed?;
+    if cameras.len() == 1 || cameras.iter().any(is_spline) {
+        return None;
+    }
+    let layout = &settled.minimum.layout;
+    let mut columns = Vec::new();
+    let mut starts = Vec::new();
+    for (parameters, pose) in layout.parameters.iter().zip(&layout.cameras) {
+        starts.push(columns.len());
+        columns.extend(parameters.iter().map(|(_, column)| *column));
+        columns.extend(pose.iter().flat_map(|first| *first..first + 6));
+    }
+    let mut joint = observed_of(observed, &columns);
+    // The covariances of single cameras may be raised.
+    let mut covariance = joint.covariance.into_inner();
+    for (camera, start) in cameras.iter().zip(starts) {
+        let own = camera.projection.as_ref().and_then(|known| known.observed.as_ref());
+        if let Some(own) = own {
+            let n = own.covariance.rows();
+            covariance.view_mut((start, start), (n, n)).copy_from(own.covariance.inner());
+        }
+    }
+    joint.covariance = Matrix::new(covariance);
+    Some(joint)
 }
 
 /// Minimum sum of the weights of a corner's observations for a measured position: a view has two

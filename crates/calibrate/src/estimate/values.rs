@@ -18,7 +18,7 @@ use crate::problem::roughness::Roughness;
 use crate::problem::shape::BoardShape;
 use crate::start::symmetry::LabelRotation;
 use crate::uncertainty::information::KnownSoFar;
-use crate::uncertainty::projection::ProjectionUncertainty;
+use crate::uncertainty::projection::{ObservedCovariance, ProjectionUncertainty};
 use crate::uncertainty::state_equations::StateEquations;
 use deltille_core::camera::{Camera, Pose};
 use deltille_core::statistics::median;
@@ -62,6 +62,10 @@ pub struct Estimate {
     pub lack_of_fit: Vec<LackOfFit>,
     /// The same cameras in the held-out frames, if there are any; only the poses of the target were estimated there.
     pub held_out: Option<Box<Estimate>>,
+    /// Observed covariance of all cameras of a rig together: for each camera its estimated parameters, then (ω, τ) of
+    /// [`camera_from_rig`](CameraEstimate::camera_from_rig) about the camera's axes (rad, mm) if it was estimated. `None`
+    /// for a single camera, with splines, or with too few frames.
+    pub joint: Option<ObservedCovariance>,
     /// Number of iterations of the last bundle adjustment.
     pub steps: usize,
     /// The information about the first camera and the board's shape, on which proposals of views

@@ -57,7 +57,7 @@ impl CameraPrior {
 }
 
 /// The inverse of a covariance of parameters with different units.
-fn inverted(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+pub(crate) fn inverted(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = covariance.nrows();
     let scale = DVector::from_fn(n, |i, _| covariance[(i, i)].sqrt().recip());
     let mut scaled = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] * scale[i] * scale[j]);

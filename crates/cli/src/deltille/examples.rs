@@ -85,7 +85,8 @@ pub const COMPARE: &str = "Examples:
 
 pub const CHECK: &str = "Examples:
   deltille check camera.json today/*.jpg --target desk/desk.json
-  deltille check camera.json corners --target desk/desk.json -o check.json";
+  deltille check camera.json corners --target desk/desk.json -o check.json
+  deltille check rig.json --camera left=today/left --camera right=today/right --target desk/desk.json";
 
 pub const POSE: &str = "Examples:
   deltille pose photos --target desk/desk.json --camera camera.yaml

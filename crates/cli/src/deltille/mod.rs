@@ -120,10 +120,10 @@ enum Command {
     /// uncertainties of a camera are unknown. Use the .json of a calibration, which contains them.
     #[command(after_help = examples::COMPARE)]
     Compare(compare::Args),
-    /// Test whether a camera is still as calibrated, from a few photographs of a target
+    /// Test whether a camera or a rig is still as calibrated, from a few photographs of a target
     ///
     /// The answer is `unchanged` (exit code 0), `changed` with what has changed (1), or `cannot tell` with what is
-    /// missing (3). The camera file must contain uncertainties: the .json of `deltille calibrate`.
+    /// missing (3). The camera file must contain uncertainties: the .json of `deltille calibrate` or `deltille rig`.
     #[command(after_help = examples::CHECK)]
     Check(check::Args),
     /// Estimate the pose of a target in photographs from a calibrated camera

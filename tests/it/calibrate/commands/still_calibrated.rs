@@ -1,6 +1,8 @@
 //! `deltille check`: the three answers and their exit codes.
 
-use super::{CALIBRATE, board, camera, detections, done, folder, json, output, seen_whole};
+use super::{
+    CALIBRATE, board, camera, detections, done, folder, json, output, refused, seen_whole,
+};
 use deltille::camera::{Camera, Pose};
 use deltille::detect::Detection;
 use deltille::export::detection;
@@ -13,6 +15,17 @@ use std::path::Path;
 
 /// Views of a camera, tilted by these angles to all sides.
 fn views(target: &Target, camera: &Camera, tilts_rad: &[f64], seed: u64) -> Vec<Detection> {
+    beside(target, camera, &Pose::IDENTITY, tilts_rad, seed)
+}
+
+/// The same views of a camera with this pose on the rig.
+fn beside(
+    target: &Target,
+    camera: &Camera,
+    camera_from_rig: &Pose,
+    tilts_rad: &[f64],
+    seed: u64,
+) -> Vec<Detection> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let middle = target.panels[0].middle_mm();
     let pose = |(index, &tilt): (usize, &f64)| {
@@ -20,14 +33,14 @@ fn views(target: &Target, camera: &Camera, tilts_rad: &[f64], seed: u64) -> Vec<
         let facing = DQuat::from_rotation_x(std::f64::consts::PI);
         let rotation = DQuat::from_scaled_axis(side * tilt) * facing;
         let centre = DVec3::new(60.0 * side.x, 40.0 * side.y, 330.0);
-        Pose { rotation, translation: centre - rotation * middle }
+        camera_from_rig.after(&Pose { rotation, translation: centre - rotation * middle })
     };
     let poses: Vec<Pose> = tilts_rad.iter().enumerate().map(pose).collect();
     poses.iter().map(|pose| seen_whole(target, camera, pose, &mut random)).collect()
 }
 
 fn write(at: &Path, name: &str, detections: &[Detection]) {
-    std::fs::create_dir(at.join(name)).unwrap();
+    std::fs::create_dir_all(at.join(name)).unwrap();
     for (index, found) in detections.iter().enumerate() {
         let mut found = found.clone();
         found.image = format!("{index}.png");
@@ -37,8 +50,12 @@ fn write(at: &Path, name: &str, detections: &[Detection]) {
 
 /// The exit code, the printed text and the file of a check of views.
 fn check(at: &Path, camera: &str, views: &str) -> (Option<i32>, String, Value) {
+    let inputs = match camera.starts_with("rig") {
+        true => format!("--camera left={views}/left --camera right={views}/right"),
+        false => views.to_owned(),
+    };
     let args = format!(
-        "check {camera} {views} --target board.json --board-accuracy 0 -o {views}.json --force"
+        "check {camera} {inputs} --target board.json --board-accuracy 0 -o {views}.json --force"
     );
     let result = output(at, &args);
     let text = String::from_utf8_lossy(&result.stdout).into_owned();
@@ -74,12 +91,12 @@ fn a_check_answers_unchanged_changed_or_cannot_tell() {
 
     let (code, text, found) = check(at, "camera.json", "zoomed");
     assert_eq!((code, &found["answer"]), (Some(1), &"changed".into()), "{text}");
-    assert_eq!(found["changed"], serde_json::json!(["focal_length"]), "{text}");
+    assert_eq!(found["changed"], serde_json::json!([{ "quantity": "focal_length" }]), "{text}");
     assert!((found["tests"][0]["change"].as_f64().unwrap() - 3.0).abs() < 0.3, "{text}");
 
     let (code, text, found) = check(at, "camera.json", "resized");
     assert_eq!(code, Some(1), "{text}");
-    assert_eq!(found["changed"], serde_json::json!(["resolution"]), "{text}");
+    assert_eq!(found["changed"], serde_json::json!([{ "quantity": "resolution" }]), "{text}");
 
     for (camera, views, kind) in [
         ("camera.json", "flat", "undetermined"),
@@ -91,4 +108,37 @@ fn a_check_answers_unchanged_changed_or_cannot_tell() {
         assert_eq!(found["missing"][0]["kind"], kind, "{text}");
         assert!(text.starts_with("cannot tell: "), "{text}");
     }
+}
+
+#[test]
+fn a_check_of_a_rig_finds_a_camera_that_has_moved() {
+    let target = board(8, 9);
+    let folder = folder(&target, &[]);
+    let at = folder.path();
+    let right = Pose { translation: DVec3::new(-60.0, 1.0, 2.0), ..Pose::IDENTITY };
+    let rotated = DQuat::from_rotation_y(0.01) * right.rotation;
+    let moved = Pose { rotation: rotated, ..right };
+    let many: Vec<f64> = (0..20).map(|index| 0.1 + 0.03 * f64::from(index)).collect();
+    let few = [0.5, 0.6, 0.4, 0.7];
+    for (name, tilts, pose, seed) in
+        [("rig", &many[..], right, 3), ("same", &few, right, 5), ("moved", &few, moved, 7)]
+    {
+        write(at, &format!("{name}/left"), &views(&target, &camera(), tilts, seed));
+        let of_right = beside(&target, &camera(), &pose, tilts, seed + 1);
+        write(at, &format!("{name}/right"), &of_right);
+    }
+    let cameras = "--camera left=rig/left --camera right=rig/right";
+    done(at, &format!("rig {cameras} --target board.json --board-accuracy 0 -o ."));
+
+    let (code, text, found) = check(at, "rig.json", "same");
+    assert_eq!((code, &found["answer"]), (Some(0), &"unchanged".into()), "{text}");
+    let (code, text, found) = check(at, "rig.json", "moved");
+    assert_eq!((code, &found["answer"]), (Some(1), &"changed".into()), "{text}");
+    // A small rotation shifts the image as the principal point does.
+    let pose = serde_json::json!({ "quantity": "pose", "camera": "right" });
+    let named = ["changed", "or"].iter().flat_map(|list| found[list].as_array().unwrap());
+    assert!(named.into_iter().any(|one| *one == pose), "{text}");
+    refused(at, "check rig.json same/left --target board.json", &["--camera NAME=FOLDER"]);
+    let wrong = "check rig.json --camera up=same/left --target board.json";
+    refused(at, wrong, &["no camera up", "left, right"]);
 }

@@ -1,23 +1,24 @@
 //! `deltille check`.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, ensure};
 
+use crate::deltille::calibrate::filming::FilmArgs;
+use crate::deltille::calibrate::rig::check_own;
+use crate::deltille::calibrate::rig_cameras::{check_named, named};
 use crate::deltille::calibrate::sightings::{self, GridArgs, SheetArgs};
 use crate::deltille::calibrate::solving::accuracy;
-use crate::deltille::files::images::{Images, RecordingArgs};
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::{camera_file, target_file};
 use crate::output::{self, Overwrite, log};
 use crate::run::{FAILED, UNDECIDED};
 use deltille::calibrate::{
-    Answer, Calibration, CameraEstimate, Check, Estimate, Model, Quantity, QuantityTest, Reference,
-    View, views,
+    Answer, Calibration, CameraEstimate, CameraViews, Check, Estimate, Intrinsics, Model,
+    QuantityTest, Reference, Suspect,
 };
-use deltille::detect::{Detection, Detector, DetectorConfig};
 use deltille::export::kind::Kind;
 use deltille::export::{check, saved};
 use deltille::layout::Printing;
@@ -28,15 +29,25 @@ use deltille_core::words::{counted, p_value, places};
 /// Arguments of `deltille check`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The calibration of the camera: the .json of `deltille calibrate`
+    /// The calibration of the camera or the rig: the .json of `deltille calibrate` or `deltille rig`
     #[arg(value_name = "CAMERA")]
     camera: PathBuf,
-    /// New photographs of the target: files, folders, patterns, videos or recordings; or their detections (.json or
-    /// .parquet) from `deltille detect`
-    #[arg(required = true, value_name = "PHOTOGRAPHS")]
+    /// New photographs of the target: files, folders, a video or a recording; or their detections (.json or .parquet) from
+    /// `deltille detect`
+    #[arg(required_unless_present = "cameras", value_name = "PHOTOGRAPHS")]
     photographs: Vec<PathBuf>,
+    /// Camera of the rig and the folder of its photographs or detections, such as left=today/left; repeat for each
+    /// camera. Images taken at the same time must have the same file name in each folder
+    #[arg(
+        long = "camera",
+        id = "cameras",
+        value_name = "NAME=FOLDER",
+        value_parser = named,
+        conflicts_with = "photographs"
+    )]
+    cameras: Vec<(String, PathBuf)>,
     #[command(flatten)]
-    recording: RecordingArgs,
+    film: FilmArgs,
     /// Target description: the .json written with the target, or a .dsc
     #[arg(long, required_unless_present = "grid", value_name = "FILE")]
     target: Option<PathBuf>,
@@ -63,7 +74,7 @@ pub struct Args {
     overwrite: Overwrite,
 }
 
-/// Checks a camera. The exit code is 1 if it has changed, and 3 if this cannot be determined.
+/// Checks a camera or a rig. The exit code is 1 if it has changed, and 3 if this cannot be determined.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let path =
         args.output.as_deref().map(|path| output::file(path, "check", "json")).transpose()?;
@@ -83,15 +94,37 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let reference = Reference::Target(&printing.target);
     let sheet =
         args.sheet.read(&limits, &reference.identities(), std::slice::from_ref(&printing))?;
-    let mut views = args.views(&printing.target, &limits)?;
-    sightings::take_known(&mut views, &reference);
-    sightings::put_on(&sheet, Some(&printing.target), &mut views)?;
     let mut calibration = Calibration::of(&reference, sightings::panels(&reference, &sheet)?);
     if args.board_accuracy.is_some() {
         calibration = calibration.board_accuracy_mm(args.board_accuracy);
     }
-    // The check ignores the model.
-    let found = calibration.camera("", views, Model::Radtan).check(&before);
+    let mut all = Vec::new();
+    for camera in &before.cameras {
+        // Only the selection of frames of a recording depends on the model.
+        let intrinsics = Intrinsics::Unknown(camera.model.unwrap_or(Model::Radtan));
+        let read = args.inputs(&camera.name).map(|inputs| {
+            let film = Some((&args.film, &intrinsics));
+            sightings::seen(inputs, film, &reference, &limits, args.assume_target)
+        });
+        let mut views = Vec::new();
+        if let Some(read) = read {
+            let option = format!("--camera {}", camera.name);
+            let read = match args.cameras.is_empty() {
+                true => read?,
+                false => read.with_context(|| option.clone())?,
+            };
+            if read.views.is_empty() {
+                log!("{}", sightings::nothing_shown(&read.detections));
+            }
+            check_own(&option, &read.detections, &all)?;
+            all.push((&camera.name, read.detections));
+            views = read.views;
+        }
+        sightings::take_known(&mut views, &reference);
+        sightings::put_on(&sheet, Some(&printing.target), &mut views)?;
+        calibration = calibration.with(CameraViews::new(&camera.name, views, intrinsics));
+    }
+    let found = calibration.check(&before);
     if let Some(path) = &path {
         output::write(path, check::write(&found).as_bytes(), args.overwrite)?;
     }
@@ -104,6 +137,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 impl Args {
+    /// The photographs or detections of a camera; `None` if there are none.
+    fn inputs(&self, camera: &str) -> Option<&[PathBuf]> {
+        match self.cameras.as_slice() {
+            [] => Some(&self.photographs),
+            cameras => {
+                let of = cameras.iter().find(|(name, _)| name == camera);
+                of.map(|(_, folder)| std::slice::from_ref(folder))
+            }
+        }
+    }
+
     /// Reads the calibration; a camera file without uncertainties is accepted, because its answer is `cannot tell`.
     fn before(&self, target: &Target) -> anyhow::Result<Estimate> {
         let path = &self.camera;
@@ -126,74 +170,33 @@ impl Args {
                 before
             }
         };
-        ensure!(
-            before.cameras.len() == 1,
-            "CAMERA: {} is a rig; check each camera with its own calibration",
-            path.display()
-        );
-        before.cameras[0].name.clear();
+        let names: Vec<&str> = before.cameras.iter().map(|camera| camera.name.as_str()).collect();
+        if self.cameras.is_empty() {
+            ensure!(
+                names.len() == 1,
+                "CAMERA: {} is a rig; give the photographs of each camera with --camera NAME=FOLDER (cameras: {})",
+                path.display(),
+                names.join(", ")
+            );
+            before.cameras[0].name.clear();
+        } else {
+            ensure!(
+                names.len() > 1,
+                "--camera: {} has one camera; give its photographs without --camera",
+                path.display()
+            );
+            check_named("--camera", &self.cameras, &names)?;
+        }
         let targets = std::slice::from_ref(target);
         let with = &before.calibrated_with;
         camera_file::check_or_note(path, with, targets, self.assume_target)?;
         Ok(before)
     }
-
-    /// Reads detections, or detects the target in photographs.
-    fn views(&self, target: &Target, limits: &Limits) -> anyhow::Result<Vec<View>> {
-        let reference = Reference::Target(target);
-        if self.photographs.iter().all(|path| is_of_detections(path)) {
-            let read =
-                sightings::read_any(&self.photographs, &reference, limits, self.assume_target)?;
-            if read.views.is_empty() {
-                log!("{}", sightings::nothing_shown(&read.detections));
-            }
-            return Ok(read.views);
-        }
-        let detector =
-            Detector::for_targets(&[target], DetectorConfig::default()).context("--target")?;
-        let (mut seen, mut unread): (Vec<(String, Detection)>, usize) = (Vec::new(), 0);
-        let options = self.recording.options(*limits);
-        for frame in Images::of(&self.photographs)?.frames(&options, true) {
-            let frame = frame?;
-            let name = frame.name();
-            match frame.read(limits, false) {
-                Ok(photograph) => {
-                    seen.push((name.clone(), detector.detect(&photograph.image, &name)));
-                }
-                Err(error) => {
-                    log!("error: {error}");
-                    unread += 1;
-                }
-            }
-        }
-        match (seen.is_empty(), unread) {
-            (true, 0) => bail!("no images to process"),
-            (true, _) => bail!("no image could be read"),
-            _ => {}
-        }
-        let found = views(&seen, &reference)?.views;
-        if found.is_empty() {
-            log!("{}", sightings::nothing_shown(&seen));
-        }
-        Ok(found)
-    }
-}
-
-/// Whether a path is a detection, or a folder with detections.
-fn is_of_detections(path: &Path) -> bool {
-    let is_one = |path: &Path| {
-        path.extension()
-            .is_some_and(|end| ["json", "parquet"].iter().any(|own| end.eq_ignore_ascii_case(own)))
-    };
-    match std::fs::read_dir(path) {
-        Ok(entries) => entries.flatten().any(|entry| is_one(&entry.path())),
-        Err(_) => is_one(path),
-    }
 }
 
 /// Describes the answer, one statement per line.
 fn describe(found: &Check) -> String {
-    let names = |of: &[Quantity], between: &str| {
+    let names = |of: &[Suspect], between: &str| {
         of.iter().map(ToString::to_string).collect::<Vec<_>>().join(between)
     };
     let of = format!("{}, {}", counted(found.views, "view"), counted(found.corners, "corner"));
@@ -225,12 +228,12 @@ fn describe(found: &Check) -> String {
 }
 
 fn describe_test(test: &QuantityTest) -> String {
-    let unit = test.quantity.unit();
+    let unit = test.of.quantity.unit();
     let digits = places(test.detectable.clamp(1e-6, 1e6)).min(4);
     let far = match test.detectable.is_finite() && test.detectable < 1e6 {
         true => format!("a change of {:.digits$} {unit} would have been found", test.detectable),
         false => "no change would have been found".to_owned(),
     };
     let change = test.change;
-    format!("{}: {change:.digits$} {unit} ({}); {far}", test.quantity, p_value(test.p_value))
+    format!("{}: {change:.digits$} {unit} ({}); {far}", test.of, p_value(test.p_value))
 }

@@ -57,9 +57,7 @@ pub fn are_images(inputs: &[PathBuf]) -> anyhow::Result<bool> {
     let (images, others): (Vec<_>, Vec<_>) = inputs.iter().partition(|path| is_image(path));
     if let ([image, ..], [other, ..]) = (images.as_slice(), others.as_slice()) {
         let [image, other] = [image, other].map(|path| path.display());
-        bail!(
-            "{image} contains images, and {other} does not: calibrate either with images or with detections"
-        );
+        bail!("{image} contains images, and {other} does not: give either images or detections");
     }
     Ok(!images.is_empty())
 }
@@ -76,7 +74,7 @@ fn has_only_images(folder: &Path) -> bool {
 }
 
 impl FilmArgs {
-    /// Detects the target in all frames of a camera, and returns those to calibrate with.
+    /// Detects the target in all frames of a camera, and returns those to use.
     pub fn see(
         &self,
         inputs: &[PathBuf],
@@ -136,7 +134,7 @@ impl Film<'_> {
         let recordings = named().filter(|path| is_recording(path)).count();
         ensure!(
             recordings == 0 || recordings == named().count(),
-            "photographs and recordings cannot be calibrated together; detect the target in each, then calibrate with all detections"
+            "photographs and recordings cannot be mixed; detect the target in each, then give all detections"
         );
         let detector = detector(reference)?;
         interrupt::keeps_results();
@@ -356,7 +354,7 @@ impl Seen {
         let frames = counted(self.inks.len(), "frame");
         if interrupt::is_raised() {
             ensure!(!is_empty, Interrupted(format!("no board found in {frames}")));
-            log!("note: interrupted after {frames}; calibrating with these");
+            log!("note: interrupted after {frames}; using these");
         }
         interrupt::end_input();
         ensure!(!is_empty || !self.errors.is_empty(), "no board of this kind found in {frames}");

@@ -14,11 +14,11 @@
 //! 7. `compare` tests whether two results differ significantly.
 
 pub mod compare;
-mod filming;
+pub mod filming;
 pub mod guide;
 pub mod one_camera;
 mod report_page;
 pub mod rig;
-mod rig_cameras;
+pub mod rig_cameras;
 pub mod sightings;
 pub mod solving;

@@ -295,7 +295,7 @@ impl Args {
 
 /// Rejects images that also belong to another camera: two cameras never detect exactly the same
 /// corners.
-fn check_own(
+pub fn check_own(
     option: &str,
     detections: &[(String, Detection)],
     others: &[(&String, Vec<(String, Detection)>)],

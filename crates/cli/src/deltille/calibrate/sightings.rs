@@ -164,12 +164,9 @@ impl SightingsArgs {
             ),
         };
         let sheet = self.sheet.read(&limits, &reference.identities(), target.as_slice())?;
-        let given = match filming::are_images(&self.inputs)? {
-            true => self.film.see(&self.inputs, &reference, intrinsics, &limits)?,
-            false => given(&self.inputs, &limits)?,
-        };
+        let film = Some((&self.film, intrinsics));
         let Read { mut views, empty, mut left_out, ink, detections } =
-            shown(views_of(given, &reference, self.assume_target)?)?;
+            shown(seen(&self.inputs, film, &reference, &limits, self.assume_target)?)?;
         let board = match reference {
             Reference::Grid(grid) if measure_target => {
                 let made = grid
@@ -295,14 +292,20 @@ pub fn shown(read: Read) -> anyhow::Result<Read> {
     Ok(read)
 }
 
-/// Reads the views in detection files or folders, see [`views_of`].
-pub fn read_any(
+/// Reads detections, or with a `film` also photographs and recordings. Accepts that no image shows the target.
+pub fn seen(
     paths: &[PathBuf],
+    film: Option<(&FilmArgs, &Intrinsics)>,
     reference: &Reference,
     limits: &Limits,
     is_assumed: bool,
 ) -> anyhow::Result<Read> {
-    views_of(given(paths, limits)?, reference, is_assumed)
+    let images = if film.is_some() { filming::are_images(paths)? } else { false };
+    let given = match film.filter(|_| images) {
+        Some((film, intrinsics)) => film.see(paths, reference, intrinsics, limits)?,
+        None => given(paths, limits)?,
+    };
+    views_of(given, reference, is_assumed)
 }
 
 /// Reads detection files or folders.

@@ -2,21 +2,21 @@
 
 use serde::Serialize;
 
-use deltille_calibrate::{Check, Missing, Quantity, QuantityTest};
+use deltille_calibrate::{Check, Missing, QuantityTest, Suspect};
 use deltille_core::json;
 
 /// Schema and version that this crate writes.
 pub const SCHEMA: &str = "deltille/check/1";
 
 #[derive(Serialize)]
-struct CheckFile {
+struct CheckFile<'a> {
     schema: &'static str,
     answer: &'static str,
-    changed: Vec<&'static str>,
-    or: Vec<&'static str>,
-    missing: Vec<MissingRecord>,
+    changed: Vec<SuspectRecord<'a>>,
+    or: Vec<SuspectRecord<'a>>,
+    missing: Vec<MissingRecord<'a>>,
     p_value: Option<f64>,
-    tests: Vec<TestRecord>,
+    tests: Vec<TestRecord<'a>>,
     views: usize,
     corners: usize,
     rms_px: f64,
@@ -24,17 +24,28 @@ struct CheckFile {
     size_px: [u32; 2],
 }
 
+/// A quantity, of a camera if there are several.
 #[derive(Serialize)]
-struct MissingRecord {
+struct SuspectRecord<'a> {
+    quantity: &'static str,
+    #[serde(skip_serializing_if = "str::is_empty")]
+    camera: &'a str,
+}
+
+#[derive(Serialize)]
+struct MissingRecord<'a> {
     kind: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     quantity: Option<&'static str>,
+    #[serde(skip_serializing_if = "str::is_empty")]
+    camera: &'a str,
     text: String,
 }
 
 #[derive(Serialize)]
-struct TestRecord {
-    quantity: &'static str,
+struct TestRecord<'a> {
+    #[serde(flatten)]
+    of: SuspectRecord<'a>,
     unit: &'static str,
     change: f64,
     p_value: f64,
@@ -45,21 +56,20 @@ struct TestRecord {
 
 /// The JSON text of a check.
 pub fn write(found: &Check) -> String {
-    let names = |of: &[Quantity]| of.iter().map(|quantity| quantity.name()).collect();
-    let missing = found.missing.iter().map(|missing| MissingRecord {
-        kind: missing.name(),
-        quantity: match missing {
-            Missing::Undetermined { quantity, .. } => Some(quantity.name()),
-            _ => None,
-        },
-        text: missing.to_string(),
+    let missing = found.missing.iter().map(|missing| {
+        let (quantity, camera) = match missing {
+            Missing::Undetermined { of, .. } => (Some(of.quantity.name()), of.camera.as_str()),
+            Missing::Views { camera } => (None, camera.as_str()),
+            _ => (None, ""),
+        };
+        MissingRecord { kind: missing.name(), quantity, camera, text: missing.to_string() }
     });
     let [camera_size_px, size_px] = found.sizes_px;
     let file = CheckFile {
         schema: SCHEMA,
         answer: found.answer.name(),
-        changed: names(&found.changed),
-        or: names(&found.or),
+        changed: found.changed.iter().map(suspect).collect(),
+        or: found.or.iter().map(suspect).collect(),
         missing: missing.collect(),
         p_value: found.p_value,
         tests: found.tests.iter().map(test).collect(),
@@ -72,10 +82,14 @@ pub fn write(found: &Check) -> String {
     json::to_text(&file, 3)
 }
 
-fn test(found: &QuantityTest) -> TestRecord {
+fn suspect(of: &Suspect) -> SuspectRecord<'_> {
+    SuspectRecord { quantity: of.quantity.name(), camera: &of.camera }
+}
+
+fn test(found: &QuantityTest) -> TestRecord<'_> {
     TestRecord {
-        quantity: found.quantity.name(),
-        unit: found.quantity.unit(),
+        of: suspect(&found.of),
+        unit: found.of.quantity.unit(),
         change: found.change,
         p_value: found.p_value,
         detectable: Some(found.detectable).filter(|value| value.is_finite()),

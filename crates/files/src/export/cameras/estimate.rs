@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use deltille_calibrate::Matrix;
 use glam::DVec3;
 use serde::Serialize;
 
 use super::motion::Motion;
 use deltille_calibrate::{
     Alternative, BoardShape, CameraEstimate, ChangedIntrinsic, Coverage, Diagnosis, Estimate,
-    LackOfFit, LensLimit, Messages, PanelRef, Source, TargetMap, ViewEstimate,
+    LackOfFit, LensLimit, Matrix, Messages, ObservedCovariance, PanelRef, Source, TargetMap,
+    ViewEstimate,
 };
 use deltille_core::camera::{Lens, SplineGrid};
 use deltille_core::detection::InkEstimate;
@@ -67,6 +67,16 @@ pub(in crate::export) struct ProjectionRecord {
     board_covariance: Option<Vec<Vec<f64>>>,
     distances_mm: Vec<f64>,
     maps: Vec<UncertaintyRecord>,
+}
+
+/// Observed covariance of the unknowns of all cameras of a rig.
+#[derive(Serialize)]
+pub(in crate::export) struct JointRecord {
+    /// Lower triangle.
+    covariance: Vec<Vec<f64>>,
+    freedom: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    board_covariance: Option<Vec<Vec<f64>>>,
 }
 
 /// Standard deviation of projections over the image, row by row.
@@ -248,6 +258,14 @@ pub(in crate::export) fn projection(camera: &CameraEstimate) -> Option<Projectio
         distances_mm: known.distances_mm.clone(),
         maps: maps.collect(),
     })
+}
+
+pub(in crate::export) fn joint(known: &ObservedCovariance) -> JointRecord {
+    JointRecord {
+        covariance: lower_triangle(&known.covariance),
+        freedom: known.freedom,
+        board_covariance: known.of_board.as_ref().map(lower_triangle),
+    }
 }
 
 /// Correlations of a covariance. With many parameters, only the lower triangle is written, to nine

@@ -4,9 +4,9 @@
 use serde::Serialize;
 
 use super::estimate::{
-    CoverageRecord, DiagnosisRecord, MapRecord, ParameterRecord, Print, ProjectionRecord,
-    Residuals, ShapeRecord, ViewRecord, correlations, coverage, diagnoses, map, parameters,
-    projection, shape, spline, views,
+    CoverageRecord, DiagnosisRecord, JointRecord, MapRecord, ParameterRecord, Print,
+    ProjectionRecord, Residuals, ShapeRecord, ViewRecord, correlations, coverage, diagnoses, joint,
+    map, parameters, projection, shape, spline, views,
 };
 use super::finding::{FindingRecord, records};
 use super::motion::Motion;
@@ -38,6 +38,8 @@ struct RigFile<'a> {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     targets: Vec<TargetRecord<'a>>,
     cameras: Vec<Camera<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    joint: Option<JointRecord>,
     frames: Vec<Frame<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     held_out: Option<HeldOut<'a>>,
@@ -139,6 +141,7 @@ pub fn write(
         target_map: found.map.as_ref().map(|of_target| map(found, of_target)),
         targets: targets(found),
         cameras: found.cameras.iter().map(|camera| of_camera(found, camera, residuals)).collect(),
+        joint: found.joint.as_ref().map(joint),
         frames: frames(found),
         held_out,
         excluded: &found.excluded,

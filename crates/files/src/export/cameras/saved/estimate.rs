@@ -10,8 +10,8 @@ use glam::{DVec2, DVec3};
 
 use super::error::SavedError;
 use super::record::{
-    Fit, Rig, RigHeldOut, SavedCamera, SavedCorner, SavedExcluded, SavedFrame, SavedMap,
-    SavedOffset, SavedPose, SavedProjection, SavedSeen, SavedShape, SavedView, Single,
+    Fit, Rig, RigHeldOut, SavedCamera, SavedCorner, SavedExcluded, SavedFrame, SavedJoint,
+    SavedMap, SavedOffset, SavedPose, SavedProjection, SavedSeen, SavedShape, SavedView, Single,
     SingleHeldOut,
 };
 
@@ -51,7 +51,7 @@ impl Single {
 
 impl Rig {
     pub(super) fn estimate(self, reference: Panels) -> Result<Estimate, SavedError> {
-        let Self { rms_px, targets, cameras, frames, fit, held_out } = self;
+        let Self { rms_px, targets, cameras, joint, frames, fit, held_out } = self;
         let place =
             |frames: &[SavedFrame], name: &str| frames.iter().position(|frame| frame.name == name);
         let found = cameras.into_iter().map(|camera| {
@@ -76,6 +76,11 @@ impl Rig {
         estimate.held_out = held_out.transpose()?.map(Box::new);
         estimate.frames = frames.into_iter().map(SavedFrame::read).collect();
         estimate.cameras = cameras;
+        let joint = joint.map(SavedJoint::read).transpose();
+        estimate.joint = joint.map_err(|problem| SavedError::Field {
+            field: "joint".to_owned(),
+            problem: problem.to_owned(),
+        })?;
         let mut first = 0;
         let targets = targets.into_iter().map(|target| {
             let panels = first..target.panels.saturating_add(first);
@@ -240,6 +245,21 @@ impl SavedProjection {
             Ok(ObservedCovariance { covariance, of_board: of_board.transpose()?, freedom })
         });
         Ok(ProjectionUncertainty::new(alignment, distances_mm, observed.transpose()?))
+    }
+}
+
+impl SavedJoint {
+    fn read(self) -> Result<ObservedCovariance, &'static str> {
+        let Self { covariance, freedom, board_covariance } = self;
+        let n = covariance.len();
+        let matrix = |rows: &[Vec<f64>]| {
+            covariance_of(rows, &vec![1.0; n]).ok_or("the matrices must be lower triangles")
+        };
+        Ok(ObservedCovariance {
+            covariance: matrix(&covariance)?,
+            of_board: board_covariance.as_deref().map(matrix).transpose()?,
+            freedom,
+        })
     }
 }
 

@@ -34,6 +34,8 @@ pub(super) struct Rig {
     #[serde(default)]
     pub(super) targets: Vec<SavedTarget>,
     pub(super) cameras: Vec<SavedCamera>,
+    /// Absent in files written up to 2026-11-28.
+    pub(super) joint: Option<SavedJoint>,
     pub(super) frames: Vec<SavedFrame>,
     #[serde(flatten)]
     pub(super) fit: Fit,
@@ -123,6 +125,16 @@ pub(super) struct SavedProjection {
     pub(super) board_covariance: Option<Vec<Vec<f64>>>,
     #[serde(deserialize_with = "quantity::length_mm::de")]
     pub(super) distances_mm: Vec<f64>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct SavedJoint {
+    #[serde(deserialize_with = "quantity::figure::de")]
+    pub(super) covariance: Vec<Vec<f64>>,
+    #[serde(deserialize_with = "quantity::deviation::de")]
+    pub(super) freedom: f64,
+    #[serde(default, deserialize_with = "quantity::figure::de")]
+    pub(super) board_covariance: Option<Vec<Vec<f64>>>,
 }
 
 #[derive(Deserialize)]
