@@ -18,6 +18,7 @@ from .typing import (
     Ints,
     Loss,
     Orientation,
+    Quantity,
     RigFormat,
     Source,
     TargetFormat,
@@ -34,6 +35,7 @@ __all__ = [
     "Calibration",
     "Camera",
     "Charuco",
+    "Check",
     "Checkerboard",
     "Circles",
     "Comparison",
@@ -55,9 +57,11 @@ __all__ = [
     "NextView",
     "Octahedron",
     "Pose",
+    "QuantityTest",
     "Reason",
     "Rig",
     "Solid",
+    "Suspect",
     "Tag",
     "Target",
     "Tetrahedron",
@@ -77,6 +81,7 @@ __all__ = [
     "_tables",
     "_target",
     "calibrate",
+    "check",
     "compare",
     "compare_rigs",
     "frames",
@@ -1122,6 +1127,66 @@ def next_view(
     avoid: Sequence[NextView] | None = None,
     assume_target: bool = False,
 ) -> NextView: ...
+@final
+class Suspect:
+    @property
+    def camera(self) -> str: ...
+    @property
+    def quantity(self) -> Quantity: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@final
+class QuantityTest:
+    @property
+    def of(self) -> Suspect: ...
+    @property
+    def unit(self) -> Literal["%", "px", "mm"]: ...
+    @property
+    def change(self) -> float: ...
+    @property
+    def p_value(self) -> float: ...
+    @property
+    def detectable(self) -> float: ...
+    @property
+    def limit(self) -> float | None: ...
+
+@final
+class Check:
+    @property
+    def answer(self) -> Literal["unchanged", "changed", "cannot_tell"]: ...
+    @property
+    def changed(self) -> list[Suspect]: ...
+    @property
+    def alternatives(self) -> list[Suspect]: ...
+    @property
+    def missing(self) -> list[str]: ...
+    @property
+    def tests(self) -> list[QuantityTest]: ...
+    @property
+    def p_value(self) -> float | None: ...
+    @property
+    def views(self) -> int: ...
+    @property
+    def corners(self) -> int: ...
+    @property
+    def rms_px(self) -> float: ...
+    def to_json(self) -> str: ...
+
+def check(
+    calibration: CalibratedCamera | Rig,
+    detections: Iterable[Detection | Failure] | Mapping[str, Sequence[Detection | Failure]],
+    target: Target | Sequence[Target] | None = None,
+    *,
+    grid: Tiling | None = None,
+    rows: int | None = None,
+    cols: int | None = None,
+    edge_mm: float | None = None,
+    print_scale: ArrayLike | None = None,
+    assume_target: bool = False,
+    board_accuracy_mm: float | None = None,
+) -> Check: ...
 @final
 class Comparison:
     @property

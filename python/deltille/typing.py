@@ -21,6 +21,15 @@ Tiling: TypeAlias = Literal["deltille", "checker"]
 Source: TypeAlias = Literal["noise", "observed"]
 Loss: TypeAlias = Literal["huber", "cauchy", "none"]
 Weights: TypeAlias = Literal["covariance", "equal"]
+Quantity: TypeAlias = Literal[
+    "focal_length",
+    "principal_point",
+    "distortion",
+    "pose",
+    "board",
+    "resolution",
+    "crop",
+]
 # list: names (written by tests/it/files/lists.rs)
 TargetFormat: TypeAlias = Literal[
     "json",

@@ -55,6 +55,8 @@ mod _core {
     #[pymodule_export]
     use super::calibrate::calibration::{_calibration, _rig, Calibration, Rig};
     #[pymodule_export]
+    use super::calibrate::checking::{Check, QuantityTest, Suspect, check_of};
+    #[pymodule_export]
     use super::calibrate::comparison::{
         _located, Comparison, Located, Motion, compare, compare_rigs, pose_of,
     };

@@ -145,6 +145,18 @@ def test_comparisons(detections, board, calibration, tmp_path):
         deltille.compare(calibration, other, region="nowhere")
 
 
+def test_check(calibration, detections, board):
+    found = deltille.check(calibration, detections, board_accuracy_mm=0)
+    assert found.answer in ("unchanged", "cannot_tell") and found.changed == []
+    tests = {test.of.quantity: test for test in found.tests}
+    assert set(tests) == {"focal_length", "principal_point", "distortion", "board"}
+    assert tests["focal_length"].unit == "%" and tests["focal_length"].detectable > 0
+    assert json.loads(found.to_json())["answer"] == found.answer
+    assert deltille.check(calibration, [], board).missing == ["no photograph shows enough corners of the target"]
+    with pytest.raises(deltille.CalibrationError, match="as a sequence"):
+        deltille.check(calibration, {"left": detections}, board)
+
+
 def test_rigs(board, camera, tmp_path):
     detector = deltille.Detector(board)
     left_from_right = deltille.Pose((0, 0.1, 0), (-80, 5, 0))

@@ -9,9 +9,11 @@
 //! 4. `pickled` restores each of these after pickling.
 //! 5. `next_view` proposes the next view.
 //! 6. `comparison` tests whether two calibrations differ, and estimates the pose of a target.
+//! 7. `checking` tests whether cameras are still as calibrated, from a few new detections.
 
 pub mod calibrated_camera;
 pub mod calibration;
+pub mod checking;
 pub mod comparison;
 pub mod keywords;
 pub mod next_view;

@@ -86,7 +86,7 @@ impl Seen {
     }
 
     /// Returns the targets with their sheets; none for a grid.
-    fn printed(&self) -> &[Printing] {
+    pub fn printed(&self) -> &[Printing] {
         match self {
             Self::Targets { printed, .. } => printed,
             Self::Grid(_) => &[],
