@@ -185,7 +185,7 @@ pub enum Missing {
         /// Name of the camera; empty for a single camera.
         camera: String,
     },
-    /// Too few views of several cameras at the same time relate the cameras to each other.
+    /// No views of several cameras at the same time relate the cameras to each other.
     Link,
     /// Neither the camera nor a changed camera fits the views.
     Fit {
@@ -241,8 +241,8 @@ impl fmt::Display for Missing {
                 write!(to, "no photograph of {camera} shows enough corners of the target")
             }
             Self::Link => to.write_str(
-                "the photographs do not relate all cameras to each other: photograph the board with all cameras at three \
-                 times or more, and give photographs of the same time the same file name",
+                "the photographs do not relate all cameras to each other: photograph the board with several cameras at the \
+                 same time, and give photographs of the same time the same file name",
             ),
             Self::Fit { rms_px } => write!(
                 to,

@@ -166,10 +166,36 @@ fn start(views: &Calibration, earlier: &Earlier) -> Result<Problem, Missing> {
             return Err(Missing::Views { camera: known.name.clone() });
         }
     }
+    if earlier.cameras.len() > 1 && !are_linked(&views.cameras) {
+        return Err(Missing::Link);
+    }
+    // Relative poses are estimated from three times or more; from fewer, they start at the earlier ones.
+    let started = started(views, earlier, false).or_else(|_| started(views, earlier, true));
+    let mut problem =
+        started.map_err(|_| Missing::Views { camera: earlier.cameras[0].name.clone() })?;
+    for (index, (of, known)) in problem.cameras.iter_mut().zip(earlier.cameras).enumerate() {
+        if !problem.blocks.iter().any(|block| block.camera == index) {
+            return Err(Missing::Views { camera: known.name.clone() });
+        }
+        let free = known.free();
+        of.free = (0..of.free.len()).map(|index| free.contains(&index)).collect();
+        of.pose_free = known.pose_sd.is_some();
+        let loose = earlier.parameters(index) * (LOOSE * LOOSE);
+        of.prior = Some(CameraPrior::new(&known.camera, &loose).ok_or(Missing::Covariance)?);
+    }
+    Ok(problem)
+}
+
+/// The problem with the earlier intrinsics, and with the earlier relative poses if they are `placed`.
+fn started(
+    views: &Calibration,
+    earlier: &Earlier,
+    placed: bool,
+) -> Result<Problem, CalibrationError> {
     let cameras = views.cameras.iter().zip(earlier.cameras).map(|(of, known)| {
         let mut of = CameraViews {
             intrinsics: Intrinsics::Known(known.camera.clone()),
-            camera_from_rig: None,
+            camera_from_rig: placed.then_some(known.camera_from_rig),
             ..of.clone()
         };
         if earlier.cameras.len() == 1 {
@@ -193,22 +219,20 @@ fn start(views: &Calibration, earlier: &Earlier) -> Result<Problem, Missing> {
         let poses = views.iter().filter_map(pose).collect();
         Ok(Alone { camera: camera.clone(), roughness: None, poses, excluded: Vec::new() })
     });
-    let unseen = |_| match earlier.cameras {
-        [only] => Missing::Views { camera: only.name.clone() },
-        _ => Missing::Link,
+    Ok(seen?.problem)
+}
+
+/// Returns whether views of the same time relate all cameras to each other.
+fn are_linked(cameras: &[CameraViews]) -> bool {
+    let names = |camera: &CameraViews| {
+        camera.views.iter().map(|view| view.name.clone()).collect::<BTreeSet<_>>()
     };
-    let mut problem = seen.map_err(unseen)?.problem;
-    for (index, (of, known)) in problem.cameras.iter_mut().zip(earlier.cameras).enumerate() {
-        if !problem.blocks.iter().any(|block| block.camera == index) {
-            return Err(Missing::Views { camera: known.name.clone() });
-        }
-        let free = known.free();
-        of.free = (0..of.free.len()).map(|index| free.contains(&index)).collect();
-        of.pose_free = known.pose_sd.is_some();
-        let loose = earlier.parameters(index) * (LOOSE * LOOSE);
-        of.prior = Some(CameraPrior::new(&known.camera, &loose).ok_or(Missing::Covariance)?);
+    let mut left: Vec<BTreeSet<String>> = cameras.iter().map(names).collect();
+    let Some(mut linked) = left.pop() else { return true };
+    while let Some(next) = left.iter().position(|names| !names.is_disjoint(&linked)) {
+        linked.extend(left.swap_remove(next));
     }
-    Ok(problem)
+    left.is_empty()
 }
 
 /// The change of the cameras' unknowns since the earlier calibration.
