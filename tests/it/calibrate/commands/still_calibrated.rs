@@ -140,5 +140,5 @@ fn a_check_of_a_rig_finds_a_camera_that_has_moved() {
     assert!(named.into_iter().any(|one| *one == pose), "{text}");
     refused(at, "check rig.json same/left --target board.json", &["--camera NAME=FOLDER"]);
     let wrong = "check rig.json --camera up=same/left --target board.json";
-    refused(at, wrong, &["no camera up", "left, right"]);
+    refused(at, wrong, &["no camera is named up", "left, right"]);
 }

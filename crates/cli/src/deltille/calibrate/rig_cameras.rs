@@ -282,7 +282,7 @@ pub fn check_named(
             bail!("{option}: {name} is given twice");
         }
         if !cameras.contains(&name.as_str()) {
-            bail!("{option}: no camera is named {name}");
+            bail!("{option}: no camera is named {name} (cameras: {})", cameras.join(", "));
         }
     }
     Ok(())

@@ -150,7 +150,7 @@ impl ModelChoice {
     }
 }
 
-/// Returns the model with the most parameters, of which the files are planned; a spline only if there is no other.
+/// Returns the model with the most parameters, for which the files are planned; a spline only if there is no other.
 pub fn richest(candidates: &[Model]) -> Model {
     let other = candidates.iter().rev().find(|model| **model != Model::SPLINE);
     other.copied().unwrap_or(Model::SPLINE)
