@@ -31,7 +31,7 @@ pub(crate) fn read(path: &Path, limits: &Limits) -> Result<AnyGray, Problem> {
     let image = match frames.next() {
         Some(Ok(frame)) => frame.image,
         Some(Err(Problem::Exceeded(exceeded))) => return Err(exceeded.into()),
-        _ => return Err(refused("which this version of ffmpeg does not read")),
+        _ => return Err(refused("which is damaged, or needs ffmpeg 7 or newer")),
     };
     // Versions that do not assemble the tiles of a photograph return one of them.
     let size = [image.width(), image.height()];
@@ -40,7 +40,7 @@ pub(crate) fn read(path: &Path, limits: &Limits) -> Result<AnyGray, Problem> {
     if stated_sizes(&head).into_iter().any(is_whole) {
         return Ok(image);
     }
-    Err(refused("of which this version of ffmpeg reads only a part"))
+    Err(refused("and ffmpeg reads only a part of it; version 7 or newer is needed"))
 }
 
 /// Returns the largest size that a property `ispe` states: that of the photograph, not of its tiles or thumbnail; and the

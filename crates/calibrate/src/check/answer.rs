@@ -121,6 +121,8 @@ pub struct QuantityTest {
     pub p_value: f64,
     /// The change that would have been found with a probability of 90 %, along the least visible direction.
     pub detectable: f64,
+    /// The change that would be found if the views determined the camera without an error: the calibration has errors, too.
+    pub attainable: f64,
     /// The largest detectable change that suffices for the answer `unchanged`; `None` if any does.
     pub limit: Option<f64>,
 }
@@ -200,8 +202,9 @@ pub enum Missing {
         detectable: f64,
         /// The largest useful value of it.
         limit: f64,
-        /// How the views of this camera show the board.
-        shown: Shown,
+        /// How the views of this camera show the board; `None` if no views would suffice, because the calibration is too
+        /// uncertain.
+        shown: Option<Shown>,
     },
 }
 
@@ -262,9 +265,15 @@ impl fmt::Display for Missing {
                 };
                 write!(
                     to,
-                    "a change of the {name}{camera} of {far} could go unnoticed (at most {limit:.2} {unit} is useful): \
-                     {shown}"
-                )
+                    "a change of the {name}{camera} of {far} could go unnoticed (at most {limit:.2} {unit} is useful): "
+                )?;
+                match shown {
+                    Some(shown) => shown.fmt(to),
+                    None => to.write_str(
+                        "the calibration itself is too uncertain; calibrate again with more views, and with a measured \
+                         target or --board-accuracy",
+                    ),
+                }
             }
         }
     }

@@ -95,6 +95,11 @@ impl Equations {
         Some(((&matrix + matrix.transpose()) * 0.5, score))
     }
 
+    /// The information matrix D'V⁻¹D that any number of views would approach.
+    pub(super) fn most_information(&self, by: &DMatrix<f64>) -> DMatrix<f64> {
+        by.tr_mul(&(&self.prior * by))
+    }
+
     /// Number of columns.
     pub(super) fn count(&self) -> usize {
         self.right.len()

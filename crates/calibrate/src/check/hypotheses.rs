@@ -42,6 +42,8 @@ pub(super) struct Evidence {
     quantities: Vec<(Suspect, Vec<usize>)>,
     matrix: DMatrix<f64>,
     score: DVector<f64>,
+    /// The information matrix that any number of views would approach.
+    most: DMatrix<f64>,
     /// ν.
     freedom: f64,
 }
@@ -89,8 +91,10 @@ impl Evidence {
         });
         let board = Suspect { camera: String::new(), quantity: Quantity::Board };
         push(board, of_sheet.collect());
-        let (matrix, score) = equations.information(&DMatrix::from_columns(&directions))?;
-        Some(Self { quantities, matrix, score, freedom: earlier.freedom })
+        let directions = DMatrix::from_columns(&directions);
+        let (matrix, score) = equations.information(&directions)?;
+        let most = equations.most_information(&directions);
+        Some(Self { quantities, matrix, score, most, freedom: earlier.freedom })
     }
 
     /// The statistic of some directions and its degrees of freedom.
@@ -214,11 +218,13 @@ impl Evidence {
             let sign = if n == 1 { change[0].signum() } else { 1.0 };
             let length = change.dot(&(&size * &change)).max(0.0).sqrt();
             let visible = detectable(self.statistic(columns).1, self.freedom, self.level());
+            let most = DMatrix::from_fn(n, n, |i, j| self.most[(columns[i], columns[j])]);
             Some(QuantityTest {
                 of: of.clone(),
                 change: sign * length,
                 p_value: self.p_value_beside(std::slice::from_ref(of), &[]),
                 detectable: (visible * largest(&matrix, &size)).sqrt(),
+                attainable: (visible * largest(&most, &size)).sqrt(),
                 limit,
             })
         };

@@ -94,10 +94,11 @@ fn of_sizes(from: [u32; 2], to: [u32; 2]) -> Quantity {
 
 fn undetermined(test: &QuantityTest, views: &Views, earlier: &Earlier) -> Missing {
     let camera = earlier.cameras.iter().position(|camera| camera.name == test.of.camera);
+    let limit = test.limit.unwrap_or(f64::INFINITY);
     Missing::Undetermined {
         of: test.of.clone(),
         detectable: test.detectable,
-        limit: test.limit.unwrap_or(f64::INFINITY),
-        shown: views.shown(camera.unwrap_or(0)),
+        limit,
+        shown: (test.attainable <= limit).then(|| views.shown(camera.unwrap_or(0))),
     }
 }

@@ -13,6 +13,7 @@ use crate::deltille::calibrate::sightings::{self, GridArgs, SheetArgs};
 use crate::deltille::calibrate::solving::accuracy;
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::{camera_file, target_file};
+use crate::interrupt;
 use crate::output::{self, Overwrite, log};
 use crate::run::{FAILED, UNDECIDED};
 use deltille::calibrate::{
@@ -21,6 +22,7 @@ use deltille::calibrate::{
 };
 use deltille::export::kind::Kind;
 use deltille::export::{check, saved};
+use deltille::frames::is_recording;
 use deltille::layout::Printing;
 use deltille::limits::Limits;
 use deltille::targets::Target;
@@ -129,6 +131,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         output::write(path, check::write(&found).as_bytes(), args.overwrite)?;
     }
     output::print(&describe(&found))?;
+    if interrupt::has_ended_input() {
+        return Ok(ExitCode::from(interrupt::exit_code()));
+    }
     Ok(match found.answer {
         Answer::Unchanged => ExitCode::SUCCESS,
         Answer::Changed => ExitCode::from(FAILED),
@@ -186,6 +191,13 @@ impl Args {
                 path.display()
             );
             check_named("--camera", &self.cameras, &names)?;
+            for (name, path) in &self.cameras {
+                ensure!(
+                    !is_recording(path),
+                    "--camera {name}: frames of recordings are not combined here; run `deltille detect` for each camera, \
+                     then give the folders of detections"
+                );
+            }
         }
         let targets = std::slice::from_ref(target);
         let with = &before.calibrated_with;
@@ -234,6 +246,9 @@ fn describe_test(test: &QuantityTest) -> String {
         true => format!("a change of {:.digits$} {unit} would have been found", test.detectable),
         false => "no change would have been found".to_owned(),
     };
-    let change = test.change;
-    format!("{}: {change:.digits$} {unit} ({}); {far}", test.of, p_value(test.p_value))
+    let change = format!("{:.digits$}", test.change);
+    // Without the sign of a zero.
+    let is_zero = change.bytes().all(|byte| b"-0.".contains(&byte));
+    let change = if is_zero { change.trim_start_matches('-') } else { &change };
+    format!("{}: {change} {unit} ({}); {far}", test.of, p_value(test.p_value))
 }

@@ -1,6 +1,8 @@
 //! Photographs and recordings of one camera or of several as input of a calibration.
 
 use std::collections::{BTreeMap, HashMap};
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
@@ -17,7 +19,7 @@ use crate::values::whole;
 use deltille::calibrate::{
     Calibration, CameraViews, Intrinsics, Keyframe, Keyframes, Reference, views,
 };
-use deltille::detect::{Detection, Detector, DetectorConfig, InkEstimate, Tracker};
+use deltille::detect::{Detection, Detector, DetectorConfig, InkEstimate, Reason, Tracker};
 use deltille::frames::{
     Frame, FrameOptions, FrameSets, interval_ns, is_photograph, is_recording, photographs_in,
     unread_in,
@@ -27,6 +29,9 @@ use deltille_core::words::counted;
 
 /// Default number of views of a recording: the largest number with which `--model auto` works.
 const VIEWS: u32 = 60;
+
+/// Number of first bytes of a detection that contain its schema.
+const HEAD_BYTES: u64 = 256;
 
 /// Detections before they are compared with a target.
 pub struct Given {
@@ -68,9 +73,18 @@ fn has_only_images(folder: &Path) -> bool {
     let ends =
         |path: &Path, end: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(end));
     let mut paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
-    let has_detections = paths.any(|path| ends(&path, "json") || ends(&path, "parquet"));
+    let has_detections =
+        paths.any(|path| ends(&path, "json") && is_detection(&path) || ends(&path, "parquet"));
     let images = [photographs_in(folder), unread_in(folder)].into_iter().flatten().flatten();
     !has_detections && images.count() > 0
+}
+
+/// Whether a JSON file contains a detection, and not, for example, the ground truth of a rendered photograph.
+fn is_detection(path: &Path) -> bool {
+    let mut head = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head));
+    // A file that cannot be read is reported later.
+    read.is_err() || String::from_utf8_lossy(&head).contains("deltille/detection/")
 }
 
 impl FilmArgs {
@@ -124,6 +138,8 @@ struct Seen {
     /// The ink spread of every image that could be read.
     inks: Vec<Option<InkEstimate>>,
     errors: Vec<anyhow::Error>,
+    /// Why the first image that could be read has no labels.
+    reason: Option<Reason>,
 }
 
 impl Film<'_> {
@@ -337,6 +353,9 @@ impl Seen {
     fn of(&mut self, found: Option<anyhow::Result<Detection>>) -> Option<Detection> {
         match found? {
             Ok(found) => {
+                if self.inks.is_empty() {
+                    self.reason = found.reasons.first().cloned();
+                }
                 self.inks.push(found.ink);
                 Some(found)
             }
@@ -357,7 +376,12 @@ impl Seen {
             log!("note: interrupted after {frames}; using these");
         }
         interrupt::end_input();
-        ensure!(!is_empty || !self.errors.is_empty(), "no board of this kind found in {frames}");
+        let why =
+            self.reason.as_ref().map(|why| format!("; the first shows: {why}")).unwrap_or_default();
+        ensure!(
+            !is_empty || !self.errors.is_empty(),
+            "no board of this kind found in {frames}{why}"
+        );
         let last = self.errors.pop();
         self.errors.iter().for_each(report);
         match last {

@@ -39,7 +39,7 @@ pub struct Args {
     /// The camera model.
     #[arg(long, help = format!(
         "Camera model: {}. All except spline also estimate fx, fy, cx, cy. auto: the simplest model whose held-out error \
-         is at most 5 % above the lowest. Names of other programs, such as plumb_bob or fisheye, are accepted [default: auto]",
+         no other clearly undercuts. Names of other programs, such as plumb_bob or fisheye, are accepted [default: auto]",
         Model::choice()
     ))]
     model: Option<ModelChoice>,

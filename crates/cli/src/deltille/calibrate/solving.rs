@@ -105,8 +105,8 @@ impl FromStr for ModelChoice {
             "auto" => Ok(Self::Auto),
             _ => text.parse().map(Self::Model).map_err(|error: ModelError| {
                 format!(
-                    "{error}, or auto, which selects the simplest model whose held-out error is at most 5 % above \
-                     the lowest"
+                    "{error}, or auto, which selects the simplest model whose held-out error no other clearly \
+                     undercuts"
                 )
             }),
         }
