@@ -200,10 +200,7 @@ pub fn read_colours(path: &Path, limits: &Limits) -> Result<DynamicImage, ImageE
 
 /// Returns the camera in the metadata of a HEIC file, whose pixels are not decoded here; `None` if they name none.
 pub fn camera_of_heic(path: &Path, limits: &Limits) -> Option<CameraNotes> {
-    limits::check_file(path).ok()?;
-    let file = File::open(path).ok()?;
-    let is_large = file.metadata().map_or(true, |metadata| metadata.len() > limits.max_bytes);
-    if is_large { None } else { exif_notes::camera_of_heic(BufReader::new(file)) }
+    exif_notes::camera_of_heic(Cursor::new(limits.read(path).ok()?))
 }
 
 /// Decodes a file, or the bytes of a file that was read before.

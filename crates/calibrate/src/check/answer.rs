@@ -122,7 +122,7 @@ pub struct QuantityTest {
     /// The change that would have been found with a probability of 90 %, along the least visible direction.
     pub detectable: f64,
     /// The change that would be found if the views determined the camera without an error: the calibration has errors, too.
-    pub attainable: f64,
+    pub(crate) attainable: f64,
     /// The largest detectable change that suffices for the answer `unchanged`; `None` if any does.
     pub limit: Option<f64>,
 }

@@ -1,14 +1,13 @@
 //! Photographs and recordings of one camera or of several as input of a calibration.
 
 use std::collections::{BTreeMap, HashMap};
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use anyhow::{Context, anyhow, bail, ensure};
 use rayon::prelude::*;
 
+use super::reasons::Reasons;
 use crate::deltille::files::images::{Images, RecordingArgs, Stems};
 use crate::deltille::files::images_at_once;
 use crate::interrupt;
@@ -19,7 +18,9 @@ use crate::values::whole;
 use deltille::calibrate::{
     Calibration, CameraViews, Intrinsics, Keyframe, Keyframes, Reference, views,
 };
-use deltille::detect::{Detection, Detector, DetectorConfig, InkEstimate, Reason, Tracker};
+use deltille::detect::{Detection, Detector, DetectorConfig, InkEstimate, Tracker};
+use deltille::export::detection;
+use deltille::export::kind::Kind;
 use deltille::frames::{
     Frame, FrameOptions, FrameSets, interval_ns, is_photograph, is_recording, photographs_in,
     unread_in,
@@ -29,9 +30,6 @@ use deltille_core::words::counted;
 
 /// Default number of views of a recording: the largest number with which `--model auto` works.
 const VIEWS: u32 = 60;
-
-/// Number of first bytes of a detection that contain its schema.
-const HEAD_BYTES: u64 = 256;
 
 /// Detections before they are compared with a target.
 pub struct Given {
@@ -81,10 +79,9 @@ fn has_only_images(folder: &Path) -> bool {
 
 /// Whether a JSON file contains a detection, and not, for example, the ground truth of a rendered photograph.
 fn is_detection(path: &Path) -> bool {
-    let mut head = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head));
     // A file that cannot be read is reported later.
-    read.is_err() || String::from_utf8_lossy(&head).contains("deltille/detection/")
+    let content = Limits::default().read(path);
+    content.map_or(true, |content| Kind::of(&content) == Kind::of_schema(detection::SCHEMA))
 }
 
 impl FilmArgs {
@@ -138,8 +135,8 @@ struct Seen {
     /// The ink spread of every image that could be read.
     inks: Vec<Option<InkEstimate>>,
     errors: Vec<anyhow::Error>,
-    /// Why the first image that could be read has no labels.
-    reason: Option<Reason>,
+    /// Why images show no labels.
+    reasons: Reasons,
 }
 
 impl Film<'_> {
@@ -353,9 +350,7 @@ impl Seen {
     fn of(&mut self, found: Option<anyhow::Result<Detection>>) -> Option<Detection> {
         match found? {
             Ok(found) => {
-                if self.inks.is_empty() {
-                    self.reason = found.reasons.first().cloned();
-                }
+                self.reasons.add(&found);
                 self.inks.push(found.ink);
                 Some(found)
             }
@@ -376,12 +371,7 @@ impl Seen {
             log!("note: interrupted after {frames}; using these");
         }
         interrupt::end_input();
-        let why =
-            self.reason.as_ref().map(|why| format!("; the first shows: {why}")).unwrap_or_default();
-        ensure!(
-            !is_empty || !self.errors.is_empty(),
-            "no board of this kind found in {frames}{why}"
-        );
+        ensure!(!is_empty || !self.errors.is_empty(), self.reasons.nothing_shown(&frames));
         let last = self.errors.pop();
         self.errors.iter().for_each(report);
         match last {

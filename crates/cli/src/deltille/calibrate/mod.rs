@@ -8,7 +8,7 @@
 //!    input of each camera of a rig.
 //! 3. `sightings` reads the common input: detections, the target or untagged board, and the
 //!    properties of its print.
-//! 4. `filming` finds the target in photographs and recordings, instead of detections.
+//! 4. `filming` finds the target in photographs and recordings, instead of detections; `reasons` says why none shows it.
 //! 5. `solving` calls the library with a given or selected model, and prints the uncertainty of the result.
 //! 6. `report_page` writes the report, with the photographs that it shows.
 //! 7. `compare` tests whether two results differ significantly.
@@ -17,6 +17,7 @@ pub mod compare;
 pub mod filming;
 pub mod guide;
 pub mod one_camera;
+mod reasons;
 mod report_page;
 pub mod rig;
 pub mod rig_cameras;

@@ -75,7 +75,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             path.display()
         );
     }
-    let (intrinsics, known_with) = args.intrinsics()?;
+    let candidates = args.candidates();
+    let (intrinsics, known_with) = args.intrinsics(&candidates)?;
     let folder = output::folder_of(&path);
     let sample = sample(&intrinsics);
     let (planned, refused) = args.files(&stem, &sample, &[], &[], &sample_of(calibration::SCHEMA));
@@ -101,7 +102,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let mut calibration = calibration.camera(&stem, views, intrinsics);
     let model = args.model.unwrap_or(ModelChoice::Auto);
-    let tried = model.choose(&mut calibration, 0, &args.candidates())?;
+    let tried = model.choose(&mut calibration, 0, &candidates)?;
     let listed = chosen(&tried);
     let mut solved = args.solve.solve(calibration, print, vec![tried])?;
     unnamed.iter().for_each(|note| log!("{note}"));
@@ -155,12 +156,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 impl Args {
     /// Returns the intrinsics, and the targets that the camera was calibrated with.
-    fn intrinsics(&self) -> anyhow::Result<(Intrinsics, Vec<TargetIdentity>)> {
+    fn intrinsics(
+        &self,
+        candidates: &[Model],
+    ) -> anyhow::Result<(Intrinsics, Vec<TargetIdentity>)> {
         if let Some(path) = &self.fixed_intrinsics {
             let known = camera_file::read_to_keep("--fixed-intrinsics", path)?;
             return Ok((Intrinsics::Known(known.camera), known.calibrated_with));
         }
-        Ok((Intrinsics::Unknown(richest(&self.candidates())), Vec::new()))
+        Ok((Intrinsics::Unknown(richest(candidates)), Vec::new()))
     }
 
     /// Returns the models that are compared.

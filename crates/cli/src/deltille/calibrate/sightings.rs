@@ -1,12 +1,13 @@
 //! Input options of the calibration commands: the target and its detections.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail, ensure};
 use clap::ValueEnum;
 
 use super::filming::{self, FilmArgs, Given};
+use super::reasons::Reasons;
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::{camera_file, detection_tables, target_file};
 use crate::output::log;
@@ -402,17 +403,9 @@ fn assume(detections: &mut [(String, Detection)], reference: &Reference) {
 
 /// Reports that no image shows the target, with the most frequent reason.
 pub fn nothing_shown(detections: &[(String, Detection)]) -> String {
-    let mut given = BTreeMap::new();
-    for (_, found) in detections {
-        let reasons: BTreeMap<_, _> = found.reasons.iter().map(|why| (why.kind, why)).collect();
-        for (kind, why) in reasons {
-            given.entry(kind).or_insert((0, why)).0 += 1;
-        }
-    }
-    let pictures = counted(detections.len(), "image");
-    let most = given.into_values().max_by_key(|(count, _)| *count);
-    let why = most.map(|(count, why)| format!("; {count} of them: {why}")).unwrap_or_default();
-    format!("no board of this kind found in {pictures}{why}")
+    let mut reasons = Reasons::default();
+    detections.iter().for_each(|(_, found)| reasons.add(found));
+    reasons.nothing_shown(&counted(detections.len(), "image"))
 }
 
 /// Returns a note if some non-empty detections do not name their target.

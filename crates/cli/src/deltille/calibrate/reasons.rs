@@ -1,0 +1,26 @@
+//! Why no image shows the target.
+
+use std::collections::BTreeMap;
+
+use deltille::detect::{Detection, Reason, ReasonKind};
+
+/// Why images show no labels: the number of images, and the first reason, of each kind.
+#[derive(Default)]
+pub struct Reasons(BTreeMap<ReasonKind, (usize, Reason)>);
+
+impl Reasons {
+    /// Adds the reasons of an image.
+    pub fn add(&mut self, found: &Detection) {
+        let reasons: BTreeMap<_, _> = found.reasons.iter().map(|why| (why.kind, why)).collect();
+        for (kind, why) in reasons {
+            self.0.entry(kind).or_insert_with(|| (0, why.clone())).0 += 1;
+        }
+    }
+
+    /// Reports that none of these images shows the target, with the most frequent reason.
+    pub fn nothing_shown(&self, images: &str) -> String {
+        let most = self.0.values().max_by_key(|(count, _)| *count);
+        let why = most.map(|(count, why)| format!("; {count} of them: {why}")).unwrap_or_default();
+        format!("no board of this kind found in {images}{why}")
+    }
+}
