@@ -29,6 +29,7 @@ Quantity: TypeAlias = Literal[
     "board",
     "resolution",
     "crop",
+    "orientation",
 ]
 # list: names (written by tests/it/files/lists.rs)
 TargetFormat: TypeAlias = Literal[

@@ -1,13 +1,13 @@
 """A rig from one bag: two cameras of unequal rates, with jitter and lost messages, in one command.
 
-    rig_recording.py render <board.json> <folder> [--seed N]          # board.pdf beside it
-    rig_recording.py check <deltille> <board.json> <folder>
+    rig_recording.py render <board.json> <folder> [--seed N] [--turned DEGREES]          # board.pdf beside it
+    rig_recording.py check <deltille> <board.json> <folder> [--later FOLDER ...]
 
 The page is drawn by poppler and filmed as in `from_video.py`. The left camera takes 12 images a second, the right one 6, each
 up to 4 ms early or late; a tenth of the messages is lost; messages are recorded up to 30 ms after their time stamp. `rosbags`
 writes them as MCAP, as SQLite and as a bag of ROS 1, and `ffmpeg` as two videos. `check` calibrates the rig with one command
-from each, and compares the cameras and their relative pose with the truth. The results must be equal to those from the same
-frames as PNG.
+from each, and compares the cameras and their relative pose with the truth. The results must be equal. Then `deltille check`
+compares the rig with later recordings, in which the right camera may be turned.
 """
 
 import argparse
@@ -15,6 +15,7 @@ import json
 import math
 import pathlib
 import shutil
+import subprocess
 
 import cv2
 import numpy as np
@@ -38,14 +39,17 @@ EXPOSURE, JITTER_S, LATE_S, LOST = 0.15, 0.004, 0.03, 0.1
 START_NS = 1_700_000_000_000_000_000
 
 
-def render(board, folder, seed):
+def render(board, folder, seed, turned):
     folder = pathlib.Path(folder)
     page, rng = Page(board), np.random.default_rng(seed)
     hand = Hand(page, CAMERAS["left"], seed, 10, np.array(SIZE))
     for name, camera in CAMERAS.items():
         out = folder / "frames" / name
         out.mkdir(parents=True, exist_ok=True)
-        rays, pose = pinhole_rays(camera, size=SIZE), RIGHT_FROM_LEFT if name == "right" else (np.eye(3), np.zeros(3))
+        rays, pose = pinhole_rays(camera, size=SIZE), (np.eye(3), np.zeros(3))
+        if name == "right":
+            turn_by = turn(1, math.radians(turned))
+            pose = turn_by @ RIGHT_FROM_LEFT[0], turn_by @ RIGHT_FROM_LEFT[1]
         for index in range(hand.count * RATES[name] // 30):
             seconds = index / RATES[name] + rng.uniform(-1, 1) * JITTER_S + JITTER_S
             image = frame(page, rays, camera["fx"], hand, 30 * seconds, EXPOSURE, rng, pose)
@@ -110,7 +114,7 @@ def off(found):
                 yield name, error, sd
 
 
-def check(program, board, folder):
+def check(program, board, folder, later):
     folder = pathlib.Path(folder)
     results = {}
     for name, inputs in recordings(folder):
@@ -127,6 +131,11 @@ def check(program, board, folder):
     for name, errors in results.items():
         # The stamps of videos are rounded, which has no effect on the sets.
         assert errors == results["mcap"], name
+    for other in map(pathlib.Path, later):
+        _, inputs = next(recordings(other))
+        command = [program, "check", folder / "out/mcap/rig.json", *inputs, "--target", board, "--board-accuracy", "0"]
+        done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
+        print(f"{other}: exit code {done.returncode}\n{done.stdout}{done.stderr}", flush=True)
 
 
 if __name__ == "__main__":
@@ -138,5 +147,10 @@ if __name__ == "__main__":
         one.add_argument("board")
         one.add_argument("folder")
     rendering.add_argument("--seed", type=int, default=1)
+    rendering.add_argument("--turned", type=float, default=0)
+    checking.add_argument("--later", nargs="*", default=[])
     args = parser.parse_args()
-    render(args.board, args.folder, args.seed) if args.command == "render" else check(args.program, args.board, args.folder)
+    if args.command == "render":
+        render(args.board, args.folder, args.seed, args.turned)
+    else:
+        check(args.program, args.board, args.folder, args.later)

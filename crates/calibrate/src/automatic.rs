@@ -14,6 +14,7 @@ use super::input::observation::View;
 use super::input::sample::evenly;
 use super::model::Model;
 use super::problem::whitening::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
+use super::start::single_camera::enough;
 use deltille_core::statistics::median;
 
 /// Minimum number of corner coordinates per parameter of a spline. With fewer, the prior of its knots has as much weight as the
@@ -80,6 +81,8 @@ impl Calibration {
         camera: usize,
         among: &[Model],
     ) -> Result<(Model, Vec<Candidate>), CalibrationError> {
+        let count = self.cameras[camera].views.len();
+        enough(count, count)?;
         let views = evenly(&self.cameras[camera].views, MAX_VIEWS);
         let coordinates: usize = views.map(|view: &View| 2 * view.corner_count()).sum();
         let of_fit = coordinates - coordinates / HELD_OUT;

@@ -28,7 +28,7 @@ pub(crate) fn extension(path: &Path) -> String {
 }
 
 /// Whether a file is a HEIC photograph.
-pub(crate) fn is_heic(path: &Path) -> bool {
+pub fn is_heic(path: &Path) -> bool {
     ["heic", "heif", "hif"].contains(&extension(path).as_str())
 }
 
@@ -47,6 +47,11 @@ pub fn is_recording(path: &Path) -> bool {
     let extension = extension(path);
     let is_known = [VIDEOS.as_slice(), &BAGS].concat().contains(&extension.as_str());
     if path.is_dir() { is_bag_folder(path) } else { is_known }
+}
+
+/// Whether a path is a recording with topics: of a robot, or the folder of one.
+pub fn is_bag(path: &Path) -> bool {
+    is_recording(path) && !is_video(path)
 }
 
 /// Whether a folder is a bag of ROS 2, finished or not.

@@ -46,7 +46,7 @@ mod video;
 #[cfg(feature = "video")]
 mod y4m;
 
-pub use folder::{is_photograph, is_recording, photographs_in, unread_in};
+pub use folder::{is_bag, is_heic, is_photograph, is_recording, photographs_in, unread_in};
 pub use frame::Frame;
 pub use frames::{FrameOptions, Frames};
 pub use problem::{FramesError, Problem};

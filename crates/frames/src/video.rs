@@ -48,6 +48,7 @@ pub(crate) struct Video {
     /// Duration, ns; 0 while it is not known.
     duration_ns: Arc<AtomicI64>,
     limits: Limits,
+    has_frames: bool,
     has_ended: bool,
 }
 
@@ -80,7 +81,8 @@ impl Video {
         let read = move |log| thread::spawn(move || read_log(log, &sender, &duration));
         let log = child.stderr.take().map(read);
         let limits = *limits;
-        Ok(Self { child, frames: None, stated, log, duration_ns, limits, has_ended: false })
+        let (has_frames, has_ended) = (false, false);
+        Ok(Self { child, frames: None, stated, log, duration_ns, limits, has_frames, has_ended })
     }
 
     fn next_frame(&mut self) -> Result<Option<VideoFrame>, Problem> {
@@ -112,7 +114,11 @@ impl Video {
             Ok(status) => Some(status.to_string()),
             Err(error) => Some(error.to_string()),
         });
-        error.map(|error| Problem::Damaged(format!("ffmpeg reports: {}", cut(&error))))
+        let why = match self.has_frames {
+            true => "",
+            false => ", so the video was not finished, not copied completely, or is damaged",
+        };
+        error.map(|error| Problem::Damaged(format!("ffmpeg reports: {}{why}", cut(&error))))
     }
 }
 
@@ -125,6 +131,7 @@ impl Iterator for Video {
         }
         let next = self.next_frame();
         if let Ok(Some(frame)) = next {
+            self.has_frames = true;
             return Some(Ok(frame));
         }
         self.has_ended = true;

@@ -33,7 +33,7 @@ impl Suspect {
     }
 
     /// ``"focal_length"``, ``"principal_point"``, ``"distortion"``, ``"pose"`` (on the rig), ``"board"``,
-    /// ``"resolution"`` or ``"crop"``.
+    /// ``"resolution"``, ``"crop"`` or ``"orientation"``.
     #[getter]
     fn quantity(&self) -> &'static str {
         self.quantity

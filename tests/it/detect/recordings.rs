@@ -1,7 +1,9 @@
 //! Frames of videos, MCAP files and bags. `tests/independent/recordings.py` writes the files.
 
 use std::fs;
+use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
+use std::process::Stdio;
 
 use assert_cmd::Command;
 use deltille::detect::Detection;
@@ -54,12 +56,14 @@ fn frames_have_the_same_corners_in_every_recording() {
     assert_eq!(detect("run.bag --every 2", "every").len(), 1);
 }
 
+/// The camera of the recordings.
+const CAMERA: &str =
+    "width: 160\nheight: 120\nmodel: pinhole\nfocal_px: [150.4, 150.4]\ncentre_px: [80, 60]\n";
+
 #[test]
 fn poses_have_the_times_of_their_frames() {
     let folder = folder();
-    let camera = "width: 160\nheight: 120\nmodel: pinhole\nfocal_px: [150.4, 150.4]\n\
-                  centre_px: [80, 60]\n";
-    fs::write(folder.path().join("camera.yaml"), camera).unwrap();
+    fs::write(folder.path().join("camera.yaml"), CAMERA).unwrap();
     let args = "pose run.db3 --target board.json --camera camera.yaml";
     let lines = deltille(folder.path(), args).success().get_output().stdout.clone();
     let lines = String::from_utf8(lines).unwrap();
@@ -69,6 +73,32 @@ fn poses_have_the_times_of_their_frames() {
         .map(Option::unwrap)
         .collect();
     assert_eq!(times, TIMES_NS);
+}
+
+#[test]
+fn interrupted_poses_are_written() {
+    let folder = folder();
+    let at = folder.path();
+    fs::write(at.join("camera.yaml"), CAMERA).unwrap();
+    image::GrayImage::new(160, 120).save(at.join("blank.png")).unwrap();
+    let mut pose = std::process::Command::new(env!("CARGO_BIN_EXE_deltille"));
+    pose.args(["pose", "run.db3", "blank.png", "-", "--target", "board.json"]);
+    pose.args(["--camera", "camera.yaml", "-o", "poses.ndjson"]).current_dir(at);
+    pose.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut pose = pose.spawn().unwrap();
+    // Reported after the frames of the recording, and before the list on standard input.
+    let mut said = BufReader::new(pose.stderr.take().unwrap());
+    let mut line = String::new();
+    said.read_line(&mut line).unwrap();
+    assert!(line.starts_with("blank.png: "), "{line}");
+    let id = pose.id().to_string();
+    assert!(std::process::Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+    line.clear();
+    said.read_line(&mut line).unwrap();
+    assert_eq!(line, "writing the results; a second signal aborts\n");
+    pose.stdin.take().unwrap().write_all(b"blank.png\n").unwrap();
+    assert_eq!(pose.wait().unwrap().code(), Some(130));
+    assert_eq!(fs::read_to_string(at.join("poses.ndjson")).unwrap().lines().count(), 2);
 }
 
 /// Files that end early are read as far as they go.
@@ -118,6 +148,8 @@ fn photographs_and_videos_without_a_decoder_are_errors() {
     fs::create_dir(path.join("photos")).unwrap();
     image::GrayImage::new(64, 64).save(path.join("photos/a.png")).unwrap();
     fs::write(path.join("photos/b.HEIC"), "no photograph").unwrap();
+    // Converted.
+    fs::write(path.join("photos/a.heic"), "no photograph").unwrap();
     fs::write(path.join("photos/c.mov"), "no video").unwrap();
     let run = |images: &str| {
         let mut command = Command::cargo_bin("deltille").unwrap();
@@ -127,6 +159,7 @@ fn photographs_and_videos_without_a_decoder_are_errors() {
     };
     let said = run("photos");
     assert!(said.contains("note: 1 file such as photos/c.mov not read"), "{said}");
+    assert!(said.contains("note: 1 HEIC photograph such as photos/a.heic not read"), "{said}");
     assert!(
         said.contains("photos/b.HEIC: a HEIC photograph") && said.contains("convert"),
         "{said}"

@@ -46,6 +46,8 @@ pub enum Quantity {
     Resolution,
     /// The shape of the image: a part of the sensor.
     Crop,
+    /// Width and height are exchanged: the images are rotated by 90°.
+    Orientation,
 }
 
 impl Quantity {
@@ -59,6 +61,7 @@ impl Quantity {
             Self::Pose => "pose",
             Self::Resolution => "resolution",
             Self::Crop => "crop",
+            Self::Orientation => "orientation",
         }
     }
 
@@ -84,6 +87,7 @@ impl fmt::Display for Quantity {
             Self::Pose => "pose on the rig",
             Self::Resolution => "resolution",
             Self::Crop => "crop",
+            Self::Orientation => "orientation (images rotated by 90°)",
         })
     }
 }

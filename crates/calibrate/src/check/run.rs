@@ -85,9 +85,10 @@ fn undecided(missing: Vec<Missing>) -> Check {
 
 /// What changes the size of an image.
 fn of_sizes(from: [u32; 2], to: [u32; 2]) -> Quantity {
-    let [from, to] = [from, to].map(|size| size.map(u64::from));
-    match from[0] * to[1] == from[1] * to[0] {
+    let [[width, height], [to_width, to_height]] = [from, to].map(|size| size.map(u64::from));
+    match width * to_height == height * to_width {
         true => Quantity::Resolution,
+        false if [width, height] == [to_height, to_width] => Quantity::Orientation,
         false => Quantity::Crop,
     }
 }

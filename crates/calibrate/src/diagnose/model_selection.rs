@@ -65,6 +65,10 @@ pub enum Alternative {
 /// The separate calibration of one camera, and its estimate.
 pub(super) type Alone = Option<(Calibration, Estimate)>;
 
+/// Minimum number of excluded views that show that the lens departs from its model: a richer model can fit a single wrong view by
+/// its additional parameters.
+const EXCLUDED_VIEWS: usize = 2;
+
 impl Calibration {
     /// This calibration of one camera with other views.
     pub(crate) fn of_views(&self, views: Vec<View>) -> Self {
@@ -112,7 +116,7 @@ impl Calibration {
         let is_out = |view: &&View| excluded.contains(view.name.as_str());
         let (out, kept): (Vec<&View>, Vec<&View>) = self.cameras[0].views.iter().partition(is_out);
         let out: Vec<&View> = evenly(&out, TRIAL_VIEWS).copied().collect();
-        if out.is_empty() {
+        if out.len() < EXCLUDED_VIEWS {
             return None;
         }
         let sample = evenly(&kept, TRIAL_VIEWS).chain(&out).map(|view| (*view).clone());

@@ -68,10 +68,11 @@ pub const GUIDE: &str = "Examples:
   deltille guide photos --target desk/desk.json --once -o next.json --until 0.05";
 
 pub const CALIBRATE: &str = "Examples:
-  deltille calibrate corners --target desk/desk.json --model radtan -o camera.yaml
-  deltille calibrate corners --target desk/desk.json --model auto --holdout 4 --report camera.html
+  deltille calibrate video.mp4 --target desk/desk.json --report camera.html
+  deltille calibrate run.mcap --topic /camera/image_raw --target desk/desk.json -o camera.yaml
+  deltille calibrate photos --target desk/desk.json --model radtan --holdout 4
   deltille calibrate corners --grid checker --rows 8 --cols 11 --edge 25mm --model radtan5
-  deltille calibrate corners --target desk/desk.json --model radtan --print-scale 1.0012,0.9995";
+  deltille calibrate corners --target desk/desk.json --print-scale 1.0012,0.9995";
 
 pub const RIG: &str = "Examples:
   deltille rig run.mcap --topic /left/image_raw --topic /right/image_raw --target desk/desk.json
@@ -86,7 +87,8 @@ pub const COMPARE: &str = "Examples:
 pub const CHECK: &str = "Examples:
   deltille check camera.json today/*.jpg --target desk/desk.json
   deltille check camera.json corners --target desk/desk.json -o check.json
-  deltille check rig.json --camera left=today/left --camera right=today/right --target desk/desk.json";
+  deltille check rig.json --camera left=today/left --camera right=today/right --target desk/desk.json
+  deltille check rig.json today.mcap --topic /left/image_raw --topic /right/image_raw --target desk/desk.json";
 
 pub const POSE: &str = "Examples:
   deltille pose photos --target desk/desk.json --camera camera.yaml

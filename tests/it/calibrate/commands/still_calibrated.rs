@@ -74,12 +74,14 @@ fn a_check_answers_unchanged_changed_or_cannot_tell() {
     write(at, "same", &views(&target, &camera(), &tilts, 5));
     write(at, "zoomed", &views(&target, &zoomed, &tilts, 6));
     write(at, "flat", &views(&target, &camera(), &[0.0], 7));
-    let resized = views(&target, &camera(), &tilts, 8).into_iter();
-    let resized = resized.map(|mut found| {
-        (found.width, found.height) = (800, 600);
-        found
-    });
-    write(at, "resized", &resized.collect::<Vec<_>>());
+    for (name, [width, height]) in [("resized", [800, 600]), ("rotated", [1200, 1600])] {
+        let views = views(&target, &camera(), &tilts, 8).into_iter();
+        let of_size = views.map(|mut found| {
+            (found.width, found.height) = (width, height);
+            found
+        });
+        write(at, name, &of_size.collect::<Vec<_>>());
+    }
     write(at, "none", &[Detection::new("", [1600, 1200], Vec::new())]);
 
     let (code, text, found) = check(at, "camera.json", "same");
@@ -94,9 +96,11 @@ fn a_check_answers_unchanged_changed_or_cannot_tell() {
     assert_eq!(found["changed"], serde_json::json!([{ "quantity": "focal_length" }]), "{text}");
     assert!((found["tests"][0]["change"].as_f64().unwrap() - 3.0).abs() < 0.3, "{text}");
 
-    let (code, text, found) = check(at, "camera.json", "resized");
-    assert_eq!(code, Some(1), "{text}");
-    assert_eq!(found["changed"], serde_json::json!([{ "quantity": "resolution" }]), "{text}");
+    for (views, quantity) in [("resized", "resolution"), ("rotated", "orientation")] {
+        let (code, text, found) = check(at, "camera.json", views);
+        assert_eq!(code, Some(1), "{text}");
+        assert_eq!(found["changed"], serde_json::json!([{ "quantity": quantity }]), "{text}");
+    }
 
     for (camera, views, kind) in [
         ("camera.json", "flat", "undetermined"),
@@ -138,7 +142,7 @@ fn a_check_of_a_rig_finds_a_camera_that_has_moved() {
     let pose = serde_json::json!({ "quantity": "pose", "camera": "right" });
     let named = ["changed", "or"].iter().flat_map(|list| found[list].as_array().unwrap());
     assert!(named.into_iter().any(|one| *one == pose), "{text}");
-    refused(at, "check rig.json same/left --target board.json", &["--camera NAME=FOLDER"]);
+    refused(at, "check rig.json same/left --target board.json", &["--camera NAME=PATH"]);
     let wrong = "check rig.json --camera up=same/left --target board.json";
     refused(at, wrong, &["no camera is named up", "left, right"]);
 }

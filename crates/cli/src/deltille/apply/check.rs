@@ -1,28 +1,31 @@
 //! `deltille check`.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 
 use crate::deltille::calibrate::filming::FilmArgs;
 use crate::deltille::calibrate::rig::check_own;
-use crate::deltille::calibrate::rig_cameras::{check_named, named};
+use crate::deltille::calibrate::rig_cameras::{CamerasArgs, Source, check_named, named, topic};
 use crate::deltille::calibrate::sightings::{self, GridArgs, SheetArgs};
 use crate::deltille::calibrate::solving::accuracy;
+use crate::deltille::files::images::RecordingArgs;
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::{camera_file, target_file};
 use crate::interrupt;
 use crate::output::{self, Overwrite, log};
 use crate::run::{FAILED, UNDECIDED};
+use crate::values::whole;
 use deltille::calibrate::{
     Answer, Calibration, CameraEstimate, CameraViews, Check, Estimate, Intrinsics, Model,
     QuantityTest, Reference, Suspect,
 };
 use deltille::export::kind::Kind;
 use deltille::export::{check, saved};
-use deltille::frames::is_recording;
+use deltille::frames::is_bag;
 use deltille::layout::Printing;
 use deltille::limits::Limits;
 use deltille::targets::Target;
@@ -35,21 +38,28 @@ pub struct Args {
     #[arg(value_name = "CAMERA")]
     camera: PathBuf,
     /// New photographs of the target: files, folders, a video or a recording; or their detections (.json or .parquet) from
-    /// `deltille detect`
+    /// `deltille detect`. For a rig, a recording of all cameras
     #[arg(required_unless_present = "cameras", value_name = "PHOTOGRAPHS")]
     photographs: Vec<PathBuf>,
-    /// Camera of the rig and the folder of its photographs or detections, such as left=today/left; repeat for each
-    /// camera. Images taken at the same time must have the same file name in each folder
+    /// Camera of the rig and its video, recording, folder of photographs or folder of detections, such as left=today/left;
+    /// repeat for each camera. Photographs and detections of the same time must have the same file name in each folder
     #[arg(
         long = "camera",
         id = "cameras",
-        value_name = "NAME=FOLDER",
+        value_name = "NAME=PATH",
         value_parser = named,
         conflicts_with = "photographs"
     )]
     cameras: Vec<(String, PathBuf)>,
-    #[command(flatten)]
-    film: FilmArgs,
+    /// Topic of the images in an MCAP file or a bag; for a rig, that of each camera, such as left=/left/image_raw
+    #[arg(long, value_name = "[NAME=]TOPIC", value_parser = topic)]
+    topic: Vec<(Option<String>, String)>,
+    /// Read only every N-th frame of recordings; for a rig, every N-th set of simultaneous frames
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1..=1_000_000u64))]
+    every: u64,
+    /// Maximum number of views [default: 60 of recordings, all photographs]
+    #[arg(long, value_name = "N", value_parser = whole(1..=100_000u32))]
+    views: Option<u32>,
     /// Target description: the .json written with the target, or a .dsc
     #[arg(long, required_unless_present = "grid", value_name = "FILE")]
     target: Option<PathBuf>,
@@ -100,21 +110,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.board_accuracy.is_some() {
         calibration = calibration.board_accuracy_mm(args.board_accuracy);
     }
+    let mut seen = args.seen(&before, &reference, &limits)?;
     let mut all = Vec::new();
     for camera in &before.cameras {
-        // Only the selection of frames of a recording depends on the model.
-        let intrinsics = Intrinsics::Unknown(camera.model.unwrap_or(Model::Radtan));
-        let read = args.inputs(&camera.name).map(|inputs| {
-            let film = Some((&args.film, &intrinsics));
-            sightings::seen(inputs, film, &reference, &limits, args.assume_target)
-        });
         let mut views = Vec::new();
-        if let Some(read) = read {
-            let option = format!("--camera {}", camera.name);
-            let read = match args.cameras.is_empty() {
-                true => read?,
-                false => read.with_context(|| option.clone())?,
-            };
+        if let Some(OfCamera { option, read }) = seen.remove(&camera.name) {
             if read.views.is_empty() {
                 log!("{}", sightings::nothing_shown(&read.detections));
             }
@@ -124,7 +124,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
         sightings::take_known(&mut views, &reference);
         sightings::put_on(&sheet, Some(&printing.target), &mut views)?;
-        calibration = calibration.with(CameraViews::new(&camera.name, views, intrinsics));
+        calibration = calibration.with(CameraViews::new(&camera.name, views, of_model(camera)));
     }
     let found = calibration.check(&before);
     if let Some(path) = &path {
@@ -141,16 +141,58 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     })
 }
 
+/// The new views of a camera.
+struct OfCamera {
+    /// The option that names them, for messages.
+    option: String,
+    read: sightings::Read,
+}
+
+/// The unknown intrinsics of a camera: only the selection of frames of a recording depends on the model.
+fn of_model(camera: &CameraEstimate) -> Intrinsics {
+    Intrinsics::Unknown(camera.model.unwrap_or(Model::Radtan))
+}
+
 impl Args {
-    /// The photographs or detections of a camera; `None` if there are none.
-    fn inputs(&self, camera: &str) -> Option<&[PathBuf]> {
-        match self.cameras.as_slice() {
-            [] => Some(&self.photographs),
-            cameras => {
-                let of = cameras.iter().find(|(name, _)| name == camera);
-                of.map(|(_, folder)| std::slice::from_ref(folder))
-            }
+    /// Reads the new views of each camera that has some.
+    fn seen(
+        &self,
+        before: &Estimate,
+        reference: &Reference,
+        limits: &Limits,
+    ) -> anyhow::Result<BTreeMap<String, OfCamera>> {
+        let Self { photographs, cameras, topic, every, views, .. } = self;
+        let (every, views, assume) = (*every, *views, self.assume_target);
+        if let [camera] = before.cameras.as_slice() {
+            let topic = match topic.as_slice() {
+                [] => None,
+                [(None, topic)] => Some(topic.clone()),
+                _ => bail!("--topic: one camera has one topic, without a name"),
+            };
+            let film = FilmArgs { recording: RecordingArgs { topic, every }, views };
+            let read =
+                sightings::seen(photographs, &film, &of_model(camera), reference, limits, assume)?;
+            let only = OfCamera { option: "PHOTOGRAPHS".to_owned(), read };
+            return Ok([(camera.name.clone(), only)].into());
         }
+        let (recording, camera) = (photographs.first().cloned(), cameras.clone());
+        let of_rig = CamerasArgs { recording, camera, topic: topic.clone(), every, views };
+        let sources = of_rig.sources(true)?;
+        let names: Vec<&str> = before.cameras.iter().map(|camera| camera.name.as_str()).collect();
+        let option = if cameras.is_empty() { "--topic" } else { "--camera" };
+        check_named(option, sources.iter().map(|source| source.name.as_str()), &names)?;
+        let of = |source: &Source| {
+            let camera = before.cameras.iter().find(|camera| camera.name == source.name);
+            camera.map_or(Intrinsics::Unknown(Model::Radtan), of_model)
+        };
+        let intrinsics: Vec<Intrinsics> = sources.iter().map(of).collect();
+        let given = of_rig.read(&sources, reference, &intrinsics, limits)?;
+        let read = sources.into_iter().zip(given).map(|(Source { name, option, .. }, given)| {
+            let read = sightings::views_of(given, reference, assume);
+            let read = read.with_context(|| option.clone())?;
+            Ok((name, OfCamera { option, read }))
+        });
+        read.collect()
     }
 
     /// Reads the calibration; a camera file without uncertainties is accepted, because its answer is `cannot tell`.
@@ -176,28 +218,22 @@ impl Args {
             }
         };
         let names: Vec<&str> = before.cameras.iter().map(|camera| camera.name.as_str()).collect();
-        if self.cameras.is_empty() {
-            ensure!(
-                names.len() == 1,
-                "CAMERA: {} is a rig; give the photographs of each camera with --camera NAME=FOLDER (cameras: {})",
-                path.display(),
-                names.join(", ")
-            );
-            before.cameras[0].name.clear();
-        } else {
-            ensure!(
+        match (self.cameras.is_empty(), self.photographs.as_slice()) {
+            (false, _) => ensure!(
                 names.len() > 1,
                 "--camera: {} has one camera; give its photographs without --camera",
                 path.display()
-            );
-            check_named("--camera", &self.cameras, &names)?;
-            for (name, path) in &self.cameras {
-                ensure!(
-                    !is_recording(path),
-                    "--camera {name}: frames of recordings are not combined here; run `deltille detect` for each camera, \
-                     then give the folders of detections"
-                );
-            }
+            ),
+            (true, [recording]) if is_bag(recording) => {}
+            (true, _) => ensure!(
+                names.len() == 1,
+                "CAMERA: {} is a rig; give the images of each camera with --camera NAME=PATH (cameras: {})",
+                path.display(),
+                names.join(", ")
+            ),
+        }
+        if let [camera] = before.cameras.as_mut_slice() {
+            camera.name.clear();
         }
         let targets = std::slice::from_ref(target);
         let with = &before.calibrated_with;

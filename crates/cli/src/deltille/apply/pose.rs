@@ -10,8 +10,9 @@ use crate::deltille::calibrate::sightings::{GridArgs, SheetArgs};
 use crate::deltille::files::images::{Images, RecordingArgs};
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::{camera_file, target_file};
+use crate::interrupt;
 use crate::output::{self, Overwrite, log, say};
-use crate::run::FAILED;
+use crate::run::{FAILED, Interrupted};
 use deltille::calibrate::{Calibration, Diagnosis, Estimate, Messages, Reference, views};
 use deltille::camera::Camera;
 use deltille::detect::{Detection, Detector, DetectorConfig};
@@ -88,8 +89,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         args.overwrite.check(path, &Kind::of_schema(pose::SCHEMA))?;
     }
     let (mut lines, mut all, mut without, mut unread) = (String::new(), 0, 0, 0);
-    let options = args.recording.options(limits);
-    for frame in Images::of(&args.images)?.frames(&options, true) {
+    let images = Images::of(&args.images)?;
+    let options = args.recording.options(limits, &images)?;
+    interrupt::keeps_results();
+    for frame in images.frames(&options, true) {
+        if interrupt::is_raised() {
+            break;
+        }
         let frame = frame?;
         all += 1;
         let (name, image) = (frame.name(), frame.path().to_owned());
@@ -133,6 +139,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             None => output::print(&of_image)?,
         }
     }
+    let found = all - without;
+    if interrupt::is_raised() && found == 0 {
+        return Err(Interrupted(format!("target found in 0 of {all} images")).into());
+    }
     if all == 0 {
         bail!("no images to process");
     }
@@ -141,7 +151,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     if let Some(path) = &path {
         output::write(path, lines.as_bytes(), args.overwrite)?;
-        say!("{}: target found in {} of {all} images", path.display(), all - without);
+        say!("{}: target found in {found} of {all} images", path.display());
+    }
+    if interrupt::is_raised() {
+        return Err(Interrupted(format!("poses of the first {all} images")).into());
     }
     Ok(if without > 0 { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })
 }

@@ -170,7 +170,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let made = made.context("--field")?;
     let images = Images::of(&args.images)?;
     let (folder, end) = (args.view.output.as_path(), "undistorted");
-    let options = args.recording.options(args.view.limits.limits());
+    let options = args.recording.options(args.view.limits.limits(), &images)?;
     let pictures = Pictures { args: &args.view, options, folder, camera: &camera, end };
     pictures.check(&images)?;
     let map = args.view.map(&made);

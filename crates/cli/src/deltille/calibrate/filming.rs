@@ -13,7 +13,7 @@ use crate::deltille::files::images_at_once;
 use crate::interrupt;
 use crate::output::log;
 use crate::progress::FrameProgress;
-use crate::run::{Interrupted, report};
+use crate::run::{Interrupted, message};
 use crate::values::whole;
 use deltille::calibrate::{
     Calibration, CameraViews, Intrinsics, Keyframe, Keyframes, Reference, views,
@@ -44,11 +44,11 @@ pub struct Given {
 #[derive(clap::Args)]
 pub struct FilmArgs {
     #[command(flatten)]
-    recording: RecordingArgs,
+    pub recording: RecordingArgs,
     /// Maximum number of views: frames in which the target is still, and which together determine the camera best
     /// [default: 60 of recordings, all photographs]
     #[arg(long, value_name = "N", value_parser = whole(1..=100_000u32))]
-    views: Option<u32>,
+    pub views: Option<u32>,
 }
 
 /// Whether the inputs are photographs and recordings, not detections.
@@ -93,8 +93,9 @@ impl FilmArgs {
         intrinsics: &Intrinsics,
         limits: &Limits,
     ) -> anyhow::Result<Given> {
-        let options = self.recording.options(*limits);
-        let camera = FilmCamera { name: "", images: Images::of(inputs)?, options, intrinsics };
+        let images = Images::of(inputs)?;
+        let options = self.recording.options(*limits, &images)?;
+        let camera = FilmCamera { name: "", images, options, intrinsics };
         let film = Film { cameras: vec![camera], every: 1, views: self.views, limits };
         let detections = film.see(reference)?.remove(0);
         Ok(Given::of_images(detections, &inputs[0]))
@@ -373,10 +374,11 @@ impl Seen {
         interrupt::end_input();
         ensure!(!is_empty || !self.errors.is_empty(), self.reasons.nothing_shown(&frames));
         let last = self.errors.pop();
-        self.errors.iter().for_each(report);
+        let excluded = |error: &anyhow::Error| log!("warning: excluded: {}", message(error));
+        self.errors.iter().for_each(excluded);
         match last {
             Some(error) if self.inks.is_empty() => return Err(error),
-            last => last.iter().for_each(report),
+            last => last.iter().for_each(excluded),
         }
         Ok(self)
     }

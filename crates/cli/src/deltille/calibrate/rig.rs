@@ -81,8 +81,9 @@ pub struct Args {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let sources = args.cameras.sources(args.refine_target)?;
     let names: Vec<&str> = sources.iter().map(|source| source.name.as_str()).collect();
-    check_named("--known", &args.known, &names)?;
-    check_named("--images", &args.images, &names)?;
+    for (option, given) in [("--known", &args.known), ("--images", &args.images)] {
+        check_named(option, given.iter().map(|(name, _)| name.as_str()), &names)?;
+    }
     check_folder(&args.output).context("-o")?;
     let limits = args.limits.limits();
     let (printed, grid) = match args.grid.read_target()? {

@@ -19,23 +19,23 @@ use deltille::targets::Name;
 pub struct CamerasArgs {
     /// A recording of all cameras, an MCAP file or a bag of ROS 1 or 2, with --topic for each camera
     #[arg(value_name = "RECORDING", conflicts_with = "camera")]
-    recording: Option<PathBuf>,
+    pub recording: Option<PathBuf>,
     /// Camera and its video, recording, folder of photographs or folder of detections, such as left=left.mp4; repeat for each
     /// camera. The first camera defines the rig's frame. Frames of recordings are combined by their time stamps, photographs and
     /// detections by their file names
     #[arg(long, required_unless_present = "recording", value_name = "NAME=PATH", value_parser = named)]
-    camera: Vec<(String, PathBuf)>,
+    pub camera: Vec<(String, PathBuf)>,
     /// Topic of a camera in RECORDING, such as /left/image_raw; repeat for each camera. The camera is named after the part of the
     /// topic that differs, or NAME. With --camera NAME=PATH, the topic in its recording
     #[arg(long, value_name = "[NAME=]TOPIC", value_parser = topic)]
-    topic: Vec<(Option<String>, String)>,
+    pub topic: Vec<(Option<String>, String)>,
     /// Use only every N-th set of simultaneous frames of recordings
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1..=1_000_000u64))]
-    every: u64,
+    pub every: u64,
     /// Maximum number of frames of the rig: those in which the target is still, and which together determine the cameras best
     /// [default: 60 of recordings, all photographs]
     #[arg(long, value_name = "N", value_parser = whole(1..=100_000u32))]
-    views: Option<u32>,
+    pub views: Option<u32>,
 }
 
 /// A camera, and where its images are.
@@ -58,7 +58,7 @@ pub fn named(text: &str) -> Result<(String, PathBuf), String> {
 }
 
 /// Parses a topic, with the name of its camera or without.
-fn topic(text: &str) -> Result<(Option<String>, String), String> {
+pub fn topic(text: &str) -> Result<(Option<String>, String), String> {
     match text.split_once('=') {
         _ if text.is_empty() => Err("expected a topic, such as /left/image_raw".to_owned()),
         Some((name, topic)) if !topic.is_empty() => {
@@ -93,10 +93,9 @@ impl CamerasArgs {
         if self.topic.is_empty() {
             let show = recording.display();
             return match Frames::open(recording, &FrameOptions::default()) {
-                Err(FramesError::Recording { problem: Problem::Topics(topics), .. }) => bail!(
-                    "{show}: choose the topic of each camera with --topic (topics with images: {})",
-                    topics.join(", ")
-                ),
+                Err(FramesError::Recording { problem: Problem::Topics(topics), .. }) => {
+                    bail!("{show}: {}", several(&topics, "that of each camera with --topic"))
+                }
                 Ok(_) => bail!(
                     "{show}: the images of one camera only; pass those of each camera with --camera NAME=PATH"
                 ),
@@ -196,14 +195,16 @@ impl Source {
 fn check_topic(path: &Path, options: &FrameOptions) -> anyhow::Result<()> {
     match Frames::open(path, options) {
         Ok(_) => Ok(()),
-        Err(FramesError::Recording { problem: Problem::Topics(topics), .. }) => bail!(
-            "{}: {} topics contain images; choose one with --topic NAME=TOPIC ({})",
-            path.display(),
-            topics.len(),
-            topics.join(", ")
-        ),
+        Err(FramesError::Recording { problem: Problem::Topics(topics), .. }) => {
+            bail!("{}: {}", path.display(), several(&topics, "one with --topic NAME=TOPIC"))
+        }
         Err(error) => Err(error.into()),
     }
+}
+
+/// Asks for a choice of topics.
+fn several(topics: &[String], choice: &str) -> String {
+    format!("{} topics contain images: choose {choice} ({})", topics.len(), topics.join(", "))
 }
 
 /// Returns the parts in which topics differ, without the common first and last parts: left and right of `/left/image_raw` and
@@ -272,16 +273,17 @@ fn check_places(sources: &[Source]) -> anyhow::Result<()> {
 }
 
 /// Rejects names of unknown cameras, and duplicates.
-pub fn check_named(
+pub fn check_named<'a>(
     option: &str,
-    given: &[(String, PathBuf)],
+    given: impl IntoIterator<Item = &'a str>,
     cameras: &[&str],
 ) -> anyhow::Result<()> {
-    for (index, (name, _)) in given.iter().enumerate() {
-        if given[..index].iter().any(|(other, _)| other == name) {
+    let mut names = BTreeSet::new();
+    for name in given {
+        if !names.insert(name) {
             bail!("{option}: {name} is given twice");
         }
-        if !cameras.contains(&name.as_str()) {
+        if !cameras.contains(&name) {
             bail!("{option}: no camera is named {name} (cameras: {})", cameras.join(", "));
         }
     }

@@ -165,9 +165,9 @@ impl SightingsArgs {
             ),
         };
         let sheet = self.sheet.read(&limits, &reference.identities(), target.as_slice())?;
-        let film = Some((&self.film, intrinsics));
-        let Read { mut views, empty, mut left_out, ink, detections } =
-            shown(seen(&self.inputs, film, &reference, &limits, self.assume_target)?)?;
+        let read =
+            seen(&self.inputs, &self.film, intrinsics, &reference, &limits, self.assume_target)?;
+        let Read { mut views, empty, mut left_out, ink, detections } = shown(read)?;
         let board = match reference {
             Reference::Grid(grid) if measure_target => {
                 let made = grid
@@ -293,18 +293,18 @@ pub fn shown(read: Read) -> anyhow::Result<Read> {
     Ok(read)
 }
 
-/// Reads detections, or with a `film` also photographs and recordings. Accepts that no image shows the target.
+/// Reads detections, photographs or recordings. Accepts that no image shows the target.
 pub fn seen(
     paths: &[PathBuf],
-    film: Option<(&FilmArgs, &Intrinsics)>,
+    film: &FilmArgs,
+    intrinsics: &Intrinsics,
     reference: &Reference,
     limits: &Limits,
     is_assumed: bool,
 ) -> anyhow::Result<Read> {
-    let images = if film.is_some() { filming::are_images(paths)? } else { false };
-    let given = match film.filter(|_| images) {
-        Some((film, intrinsics)) => film.see(paths, reference, intrinsics, limits)?,
-        None => given(paths, limits)?,
+    let given = match filming::are_images(paths)? {
+        true => film.see(paths, reference, intrinsics, limits)?,
+        false => given(paths, limits)?,
     };
     views_of(given, reference, is_assumed)
 }
@@ -545,7 +545,7 @@ fn places(paths: &[PathBuf]) -> anyhow::Result<Places> {
             let show = path.display();
             ensure!(
                 !(files.is_empty() && inside.is_empty()),
-                "{show}: no .json or .parquet file in this folder"
+                "{show}: no photograph and no detection (.json or .parquet) in this folder"
             );
             texts.extend(inside.into_iter().map(|path| Place { path, is_named: false }));
             if !files.is_empty() {

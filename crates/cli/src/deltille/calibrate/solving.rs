@@ -144,7 +144,16 @@ impl ModelChoice {
         let (Self::Auto, Some(_)) = (self, calibration.cameras()[camera].intrinsics.model()) else {
             return Ok(Vec::new());
         };
-        let (model, tried) = calibration.choose_model(camera, candidates).context(AUTO)?;
+        let chosen = calibration.choose_model(camera, candidates);
+        let (model, tried) = chosen.map_err(|error| match error {
+            // No model can be calibrated.
+            CalibrationError::TooFewViews { all, .. }
+                if all == calibration.cameras()[camera].views.len() =>
+            {
+                error.into()
+            }
+            _ => anyhow!(error).context(AUTO),
+        })?;
         calibration.set_intrinsics(camera, model);
         Ok(tried)
     }

@@ -1,15 +1,17 @@
 //! Input images of a command: files, folders, patterns, recordings, and lists on standard input.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, anyhow, bail, ensure};
 
 use crate::output::log;
 use crate::values::whole;
-use deltille::frames::{self, Frame, FrameOptions, Frames, FramesError, is_recording};
+use deltille::frames::{
+    self, Frame, FrameOptions, Frames, FramesError, is_bag, is_heic, is_recording,
+};
 use deltille::limits::Limits;
 use deltille_core::words::counted;
 
@@ -21,20 +23,31 @@ const NO_LIST: &str = "-: standard input contains no file names; write one path 
 pub struct RecordingArgs {
     /// Topic of the images in an MCAP file or a bag; needed if several topics contain images
     #[arg(long, value_name = "TOPIC")]
-    topic: Option<String>,
+    pub topic: Option<String>,
     /// Read only every N-th frame of videos, MCAP files and bags
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1..=1_000_000u64))]
-    every: u64,
+    pub every: u64,
 }
 
 impl RecordingArgs {
-    /// Returns the options with these limits.
-    pub fn options(&self, limits: Limits) -> FrameOptions {
+    /// Returns the options for these images, with these limits. Fails if they apply to recordings, and there is none.
+    pub fn options(&self, limits: Limits, images: &Images) -> anyhow::Result<FrameOptions> {
+        let has = |is_it: fn(&Path) -> bool| {
+            images.listed.is_some() || images.named.iter().any(|path| is_it(path))
+        };
+        if let Some(topic) = &self.topic {
+            ensure!(has(is_bag), "--topic {topic}: no input is an MCAP file or a bag");
+        }
+        ensure!(
+            self.every == 1 || has(is_recording),
+            "--every {}: no input is a video, an MCAP file or a bag",
+            self.every
+        );
         let mut options = FrameOptions::default();
         options.topic.clone_from(&self.topic);
         options.every = self.every;
         options.limits = limits;
-        options
+        Ok(options)
     }
 }
 
@@ -160,6 +173,14 @@ fn of_path(
 /// Returns the images directly inside a folder, sorted by name; fails if there are none. Notes files that are not read.
 fn in_folder(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let images = photographs_in(folder)?;
+    let (images, heic) = without_converted(images);
+    if let Some(first) = heic.first() {
+        let skipped = counted(heic.len(), "HEIC photograph");
+        log!(
+            "note: {skipped} such as {} not read; files of other formats have the same names",
+            first.display()
+        );
+    }
     let unread = frames::unread_in(folder).unwrap_or_default();
     let [first, ..] = unread.as_slice() else {
         if images.is_empty() {
@@ -176,6 +197,14 @@ fn in_folder(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     }
     log!("note: {skipped} not read; pass recordings by name");
     Ok(images)
+}
+
+/// Separates HEIC photographs that were converted: a file of another format has the same name.
+fn without_converted(images: Vec<PathBuf>) -> (Vec<PathBuf>, Vec<PathBuf>) {
+    let others = images.iter().filter(|path| !is_heic(path)).map(|path| path.with_extension(""));
+    let others: BTreeSet<PathBuf> = others.collect();
+    let is_read = |path: &PathBuf| !is_heic(path) || !others.contains(&path.with_extension(""));
+    images.into_iter().partition(is_read)
 }
 
 /// Returns the images directly inside a folder, sorted by name; may be empty.
@@ -223,7 +252,7 @@ impl Stems {
     pub fn claim_stem(&mut self, stem: &str, image: &Path) -> anyhow::Result<()> {
         if let Some(other) = self.taken.insert(stem.to_owned(), image.to_owned()) {
             bail!(
-                "{} and {} would both be written as {stem}; process them separately with different -o folders",
+                "{} and {} have the same name without extension, {stem}, by which results are named: rename one of them",
                 other.display(),
                 image.display()
             );

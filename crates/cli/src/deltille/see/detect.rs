@@ -145,7 +145,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         output::settle(folder).context("-o")?;
     }
     let limits = args.finder.limits();
-    let options = args.recording.options(limits);
+    let options = args.recording.options(limits, &images)?;
     let folder = args.tables();
     let earlier = match folder {
         Some(folder) => {
