@@ -24,8 +24,8 @@ pub(crate) fn camera(exif: Vec<u8>) -> Option<CameraNotes> {
     parsed(|reader| reader.read_raw(exif))
 }
 
-/// Returns the camera that a HEIC file names; `None` if it does not name any.
-pub(crate) fn camera_of_heic(mut file: impl BufRead + Seek) -> Option<CameraNotes> {
+/// Returns the camera that a HEIC or TIFF file names; `None` if it does not name any.
+pub(crate) fn camera_in(mut file: impl BufRead + Seek) -> Option<CameraNotes> {
     parsed(|reader| reader.read_from_container(&mut file))
 }
 
@@ -99,9 +99,11 @@ mod tests {
         assert_eq!(phone.lens, text("iPhone 15 Pro back triple camera 6.765mm f/1.78"));
         assert_eq!(phone.focal_mm, Some(6.764_999_866));
         assert_eq!((phone.focal_35mm_mm, phone.serial), (Some(24.0), None));
-        let photograph = camera_of_heic(Cursor::new(HEIC)).unwrap();
+        let photograph = camera_in(Cursor::new(HEIC)).unwrap();
         assert_eq!(photograph.model, text("iPhone 15 Pro"));
-        assert_eq!(camera_of_heic(Cursor::new(&HEIC[..400])), None);
+        assert_eq!(camera_in(Cursor::new(&HEIC[..400])), None);
+        // Without its pixels, a TIFF has the same form.
+        assert_eq!(camera_in(Cursor::new(PILLOW)), Some(phone));
     }
 
     /// Truncated and changed metadata, and those with a huge count, are read in part or ignored.

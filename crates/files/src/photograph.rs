@@ -200,7 +200,7 @@ pub fn read_colours(path: &Path, limits: &Limits) -> Result<DynamicImage, ImageE
 
 /// Returns the camera in the metadata of a HEIC file, whose pixels are not decoded here; `None` if they name none.
 pub fn camera_of_heic(path: &Path, limits: &Limits) -> Option<CameraNotes> {
-    exif_notes::camera_of_heic(Cursor::new(limits.read(path).ok()?))
+    exif_notes::camera_in(Cursor::new(limits.read(path).ok()?))
 }
 
 /// Decodes a file, or the bytes of a file that was read before.
@@ -220,7 +220,10 @@ fn decoded(
         file.check_pages()?;
         let mut decoder = file.decoder(limits)?;
         let orientation = decoder.orientation().map_or(1, Orientation::to_exif);
-        let camera = decoder.exif_metadata().ok().flatten().and_then(exif_notes::camera);
+        let camera = match file.format {
+            Some(ImageFormat::Tiff) => exif_notes::camera_in(file.source()?),
+            _ => decoder.exif_metadata().ok().flatten().and_then(exif_notes::camera),
+        };
         let (image, damage) = match file.jpeg() {
             Ok(Some(image)) => (image, None),
             Ok(None) => (DynamicImage::from_decoder(decoder).map_err(decode)?, None),
