@@ -129,9 +129,9 @@ fn panels_are_identified_only_by_id() {
         std::fs::create_dir(at.join(name)).unwrap();
     }
     // From all sides.
-    for index in 0..40 {
+    for index in 0..20 {
         let left =
-            tilted(&mut random, DVec3::ZERO, 400.0, (1.0 - (f64::from(index) + 0.5) / 20.0).acos());
+            tilted(&mut random, DVec3::ZERO, 400.0, (1.0 - (f64::from(index) + 0.5) / 10.0).acos());
         for (name, pose) in [("left", left), ("right", right_from_left.after(&left))] {
             let mut found = seen(&target, &camera, &pose, index);
             if (name, index) == ("left", 5) {
