@@ -24,9 +24,10 @@ use glam::DVec2;
 use multiversion::multiversion;
 use nalgebra::{DMatrix, Matrix2, Vector2};
 
+use super::cell_odds::{Mixing, Sample};
 use super::grid_blur::GridBlur;
 use super::joint_cells::{JointModel, JointOdds, RandomWords};
-use crate::lanes::{LANES, dot};
+use crate::lanes::LANES;
 use crate::refine::blurred_corner::{erf_sqrt_half, exp_negative, swept_edge};
 use deltille_core::lattice::{GridKind, TagCells};
 
@@ -72,16 +73,8 @@ const MAX_CORRELATION: f64 = 0.95;
 /// Largest number of cells.
 const MAX_CELLS: usize = 64;
 
-/// Minimum variance of a cell. With less, its odds exceed [`MAX_HALF_ODDS`] anyway.
+/// Minimum variance of a cell. With less, its odds exceed `MAX_HALF_ODDS` of `cell_odds` anyway.
 const MIN_VARIANCE: f64 = 1e-3;
-
-/// Minimum standard deviation of a predicted sample, relative to the contrast: a fiftieth of [`MODEL_ERROR`].
-const MIN_SPREAD: f32 = 1e-3;
-
-/// Minimum probability above the bound at which the truncated mean is computed. Below it, the mean
-/// is within σ/4 of the bound, and the error function is off by 1/1000 of the remaining
-/// probability.
-const MIN_ABOVE: f32 = 1e-4;
 
 /// Standard deviation of the grey levels, relative to the contrast.
 const LEVEL_ERROR: f64 = 0.15;
@@ -89,14 +82,8 @@ const LEVEL_ERROR: f64 = 0.15;
 /// Standard deviation of their slopes over a tile.
 const SLOPE_ERROR: f64 = 0.2;
 
-/// Largest half log-odds of a cell: one in two hundred cells is dirty on the print.
-const MAX_HALF_ODDS: f64 = 2.6;
-
 /// Number of unknowns in addition to the cells: the level and its slopes along u and v.
 const LEVELS: usize = 3;
-
-/// Number of iterations that replace saturated or missing samples by their expectation from the others.
-const ROUNDS: usize = 6;
 
 /// Sample positions of the cells, and the geometry by which blur mixes cells.
 #[derive(Clone, Debug)]
@@ -146,35 +133,6 @@ pub(crate) struct TileBlur {
     pub area_px2: f64,
     /// Standard deviation of a sample, relative to the contrast.
     pub noise: f64,
-}
-
-/// The estimator K and related terms.
-#[derive(Debug)]
-pub(crate) struct Mixing {
-    bits: usize,
-    /// ½ Σ W + white, by sample.
-    middle: Vec<f32>,
-    /// Rows of K, by bit.
-    gain: Vec<Vec<f32>>,
-    /// ½ W, by sample.
-    half_shares: Vec<Vec<f32>>,
-    /// 1/v, by bit.
-    inverse_variance: Vec<f32>,
-    /// Standard deviation of each predicted sample if nothing is known about the cells.
-    spread: Vec<f32>,
-    /// Joint likelihood of the cells, if they are not known one by one.
-    joint: Option<Arc<JointModel>>,
-}
-
-/// A sample of a tile on the scale of black 0 and white 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Sample {
-    /// The measured value.
-    Share(f32),
-    /// A lower bound: the sample is saturated.
-    AtLeast(f32),
-    /// No information.
-    Erased,
 }
 
 impl CellModel {
@@ -380,49 +338,6 @@ impl CellModel {
     }
 }
 
-impl Mixing {
-    /// Returns half the log-odds that each cell is white, by bit. `samples` are at the positions of
-    /// [`CellModel::points`].
-    pub(crate) fn half_odds(&self, samples: &[Sample]) -> Vec<f32> {
-        let whole = samples.iter().all(|sample| matches!(sample, Sample::Share(_)));
-        let mut off_middle: Vec<f32> = samples
-            .iter()
-            .zip(&self.middle)
-            .map(|(sample, middle)| match sample {
-                Sample::Share(share) => share - middle,
-                Sample::AtLeast(share) => (share - middle).max(0.0),
-                Sample::Erased => 0.0,
-            })
-            .collect();
-        let mut means = self.means(&off_middle);
-        if !whole {
-            for _ in 0..ROUNDS {
-                for (i, sample) in samples.iter().enumerate() {
-                    let predicted = || -> f32 {
-                        self.half_shares[i].iter().zip(&means).map(|(w, m)| w * m).sum()
-                    };
-                    match sample {
-                        Sample::Share(_) => {}
-                        Sample::AtLeast(share) => {
-                            let least = share - self.middle[i];
-                            off_middle[i] = mean_above(least, predicted(), self.spread[i]);
-                        }
-                        Sample::Erased => off_middle[i] = predicted(),
-                    }
-                }
-                means = self.means(&off_middle);
-            }
-        }
-        let most = MAX_HALF_ODDS as f32;
-        let odds = means.iter().zip(&self.inverse_variance);
-        odds.map(|(mean, inverse_variance)| (mean * inverse_variance).clamp(-most, most)).collect()
-    }
-
-    fn means(&self, off_middle: &[f32]) -> Vec<f32> {
-        self.gain[..self.bits].iter().map(|gain| dot(gain, off_middle)).collect()
-    }
-}
-
 /// Returns the sum of the kernel at the parts of each cell, by bit, for a sample at this position in bit-widths.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn sums_by_cell(parts: &[Part], [u, v]: [f32; 2], kernel: Kernel) -> [f32; MAX_CELLS] {
@@ -450,18 +365,6 @@ fn mean_bell(x: f32, reach: f32) -> f32 {
     /// √(π/2)/2.
     const SCALE: f32 = 0.626_657_07;
     SCALE * (erf_sqrt_half(x + reach) - erf_sqrt_half(x - reach)) / reach
-}
-
-/// Returns the mean of a normal distribution truncated below at `least`.
-fn mean_above(least: f32, mean: f32, deviation: f32) -> f32 {
-    let deviation = deviation.max(MIN_SPREAD);
-    let at = (least - mean) / deviation;
-    let above = 0.5 - 0.5 * erf_sqrt_half(at);
-    if above < MIN_ABOVE {
-        return least;
-    }
-    let density = (-0.5 * at * at).exp() / std::f32::consts::TAU.sqrt();
-    mean + deviation * density / above
 }
 
 /// Returns the centres of the equal triangles into which a cell is divided.

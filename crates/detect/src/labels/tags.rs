@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
+use super::cell_odds::Sample;
 use super::grid_light::{GridLight, TagInsets};
 use super::joint_cells::JointOdds;
-use super::soft_cells::{CellModel, Sample, in_tile};
+use super::soft_cells::{CellModel, in_tile};
 use super::tile_map::TileMap;
 use crate::grid::saddle_grid::SaddleGrid;
 use deltille_core::family::Family;
