@@ -17,5 +17,5 @@ pub(super) fn pixels(mm: f64, px_per_mm: f64) -> usize {
 
 /// Returns the luma of an opaque colour, with Rec. 709 weights.
 pub(super) fn luma([r, g, b]: [u8; 3]) -> u8 {
-    (0.2126 * f32::from(r) + 0.7152 * f32::from(g) + 0.0722 * f32::from(b)).round() as u8
+    ((2126 * u32::from(r) + 7152 * u32::from(g) + 722 * u32::from(b) + 5000) / 10_000) as u8
 }

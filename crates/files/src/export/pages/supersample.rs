@@ -5,8 +5,9 @@ use rayon::prelude::*;
 /// Samples per pixel along each axis. With the four levels of the renderer, an edge is located to 1/32 px.
 pub const SUBPIXELS: usize = 4;
 
-/// Maximum side of a block, px: its samples stay within the size that tiny-skia draws in one piece.
-const BLOCK: usize = 1024;
+/// Maximum side of a block, px. Its samples are far within the size that tiny-skia draws in one piece, and in colour they take
+/// 16 MB, memory which the allocator reuses for the next block.
+const BLOCK: usize = 512;
 
 /// A rectangle of an image, px.
 #[derive(Clone, Copy, Debug)]
@@ -57,16 +58,17 @@ pub fn render<E>(
 
 /// The grey pixels of a block: white minus the mean coverage.
 fn gray(block: Block, coverage: &[u8]) -> Vec<u8> {
-    let stride = block.width * SUBPIXELS;
-    let samples = (SUBPIXELS * SUBPIXELS) as u32;
-    let pixel = |x: usize, y: usize| {
-        let rows = (0..SUBPIXELS).map(|s| (y * SUBPIXELS + s) * stride + x * SUBPIXELS);
-        let sum: u32 = rows
-            .map(|start| {
-                coverage[start..start + SUBPIXELS].iter().map(|&v| u32::from(v)).sum::<u32>()
-            })
-            .sum();
-        255 - ((sum + samples / 2) / samples) as u8
-    };
-    (0..block.height).flat_map(|y| (0..block.width).map(move |x| pixel(x, y))).collect()
+    const SAMPLES: u32 = (SUBPIXELS * SUBPIXELS) as u32;
+    let mut pixels = Vec::with_capacity(block.width * block.height);
+    let mut sums = vec![0; block.width];
+    for rows in coverage.chunks_exact(SUBPIXELS * SUBPIXELS * block.width) {
+        sums.fill(SAMPLES / 2);
+        for row in rows.chunks_exact(SUBPIXELS * block.width) {
+            for (sum, samples) in sums.iter_mut().zip(row.as_chunks::<SUBPIXELS>().0) {
+                *sum += samples.iter().map(|&sample| u32::from(sample)).sum::<u32>();
+            }
+        }
+        pixels.extend(sums.iter().map(|sum| 255 - (sum / SAMPLES) as u8));
+    }
+    pixels
 }
