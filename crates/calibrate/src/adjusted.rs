@@ -1,6 +1,6 @@
 //! From views to an estimate: start, outliers, adjustment, added unknowns, uncertainties.
 
-use super::adjust::reweighting::Kept;
+use super::adjust::reweighting::{Kept, Settled};
 use super::adjust::wrong_views::{Gross, WrongFrame, within_pictures};
 use super::error::CalibrationError;
 use super::estimate::values::{CameraEstimate, Estimate};
@@ -20,6 +20,11 @@ const LOOSE_FOCAL: f64 = 0.1;
 impl Calibration {
     /// Computes the estimate from all views: start, outliers, adjustment, added unknowns, uncertainties.
     pub(super) fn adjusted(&self) -> Result<Estimate, CalibrationError> {
+        self.settled().map(|(estimate, _)| estimate)
+    }
+
+    /// The same with the adjustment that it comes from, which has the same frames.
+    pub(super) fn settled(&self) -> Result<(Estimate, Settled), CalibrationError> {
         if self.board_shape && self.panels.len() > 1 {
             return Err(CalibrationError::ShapeOfMany { panels: self.panels.len() });
         }
@@ -70,7 +75,7 @@ impl Calibration {
             check_focal(camera)?;
         }
         let excluded = excluded.into_iter().map(|(_, out)| out).collect();
-        Ok(Estimate { excluded, findings, ..estimate })
+        Ok((Estimate { excluded, findings, ..estimate }, settled))
     }
 
     /// Rejects views of panels whose poses are unknown.

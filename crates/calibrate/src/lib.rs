@@ -14,6 +14,7 @@
 //! 8. `diagnose` reports the problems of an estimate, their causes and remedies.
 //!
 //! 9. `check` tests whether a calibrated camera still agrees with a few new views.
+//! 10. `hand_eye` locates a camera and a board on a robot.
 //!
 //! `adjusted` runs 4 to 7 on all views. `solve` wraps it and holds out frames; `automatic` selects
 //! a model with `solve`; `located` computes the pose of a target. `compare` and `next_view` read
@@ -46,6 +47,7 @@ mod equations;
 mod error;
 mod estimate;
 mod excluded;
+mod hand_eye;
 mod input;
 mod located;
 mod matrix;
@@ -79,6 +81,11 @@ pub use estimate::values::{
     CameraEstimate, Corner, Estimate, FrameEstimate, Parameter, TargetEstimate, ViewEstimate,
 };
 pub use excluded::{Excluded, Reason};
+pub use hand_eye::error::HandEyeError;
+pub use hand_eye::estimate::{HandEye, HandEyeView};
+pub use hand_eye::misreading::Misreading;
+pub use hand_eye::pairing::PairedBy;
+pub use hand_eye::request::HandEyeRequest;
 pub use input::calibration::{Calibration, CameraViews, Intrinsics};
 pub use input::grid::UntaggedGrid;
 pub use input::loss::Loss;
@@ -88,6 +95,7 @@ pub use input::panel::PanelPrior;
 pub use input::panel::PanelRef;
 pub use input::photographs::{Differing, MixedPhotographs};
 pub use input::reference::Reference;
+pub use input::robot::{Mounting, RobotNoise, RobotPose, RobotPoses, RobotRotation};
 pub use input::views::{Named, ViewSet, views};
 pub use input::weights::Weights;
 pub use matrix::Matrix;

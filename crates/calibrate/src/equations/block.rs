@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use glam::{DMat3, DVec2, DVec3};
-use nalgebra::{DMatrix, DMatrixView, Matrix3, Vector3};
+use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, Vector3};
 
 use super::layout::Layout;
 use crate::input::loss::Loss;
@@ -285,6 +285,25 @@ impl Local {
         }
         let (matrix, right) = sums.finish();
         Some(Self { cost, columns, matrix, right, corners, cross })
+    }
+
+    /// The equations of whitened rows of derivatives with respect to shared unknowns (`columns`, ascending) and the pose of
+    /// the frame, and of their residuals.
+    pub(super) fn of_rows(
+        columns: Vec<usize>,
+        rows: &DMatrix<f64>,
+        residual: &DVector<f64>,
+    ) -> Self {
+        let whole = rows.tr_mul(rows);
+        let matrix = (0..whole.nrows()).flat_map(|i| (0..=i).map(move |j| (i, j)));
+        Self {
+            cost: residual.norm_squared(),
+            columns,
+            matrix: matrix.map(|at| whole[at]).collect(),
+            right: rows.tr_mul(residual).as_slice().to_vec(),
+            corners: Vec::new(),
+            cross: Vec::new(),
+        }
     }
 
     /// The corners, if they are unknown, each with the product with each column of the block.

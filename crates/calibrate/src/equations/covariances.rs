@@ -9,6 +9,9 @@ use rayon::prelude::*;
 use super::cholesky::{cholesky, half_product, inverse};
 use super::layout::Layout;
 use super::normal::{Normal, PARTS_AT_A_TIME, Part, Reduced};
+use super::robot::by_shared;
+use crate::problem::bundle::Problem;
+use deltille_core::camera::Pose;
 
 /// The covariance of all unknowns for residuals of variance 1: of the shared unknowns, of each frame's pose, and of
 /// each corner's offset.
@@ -148,6 +151,32 @@ impl Normal {
             first += c.nrows();
         }
         Some(())
+    }
+
+    /// For each frame with a link, the covariance of its predicted residual from the errors of the unknowns, for
+    /// residuals of corners of variance 1. The poses of frames must be eliminated.
+    pub(crate) fn of_links(
+        &self,
+        problem: &Problem,
+        layout: &Layout,
+        found: &Covariances,
+    ) -> Option<Vec<Option<Matrix6<f64>>>> {
+        let (robot, first) = (problem.robot.as_ref()?, layout.robot?);
+        let inverses = self.inverses(Damping::NONE)?;
+        let of_frame = |(frame, pose): (usize, &Pose)| {
+            // A frame without a used link has a prediction, too.
+            let measured = robot.poses[frame].unwrap_or_else(|| robot.predicted(pose));
+            let link = robot.link(pose, &measured);
+            let through = link.by_frame * &inverses[frame];
+            let mut by_kept = -(&through * self.b.between(frame..frame + 1).transpose());
+            let own = by_shared(robot, &link);
+            let mut of_robot = by_kept.columns_mut(first, own.ncols());
+            of_robot += own;
+            let covariance =
+                &by_kept * &found.kept * by_kept.transpose() + through * link.by_frame.transpose();
+            Some(Matrix6::from_column_slice(covariance.as_slice()))
+        };
+        Some(problem.frames.iter().enumerate().map(of_frame).collect())
     }
 
     /// The inverse of the reduced equations; the root is that of the shared unknowns, which alone may be undetermined.

@@ -18,6 +18,8 @@ pub(crate) struct Layout {
     pub targets: Vec<Option<usize>>,
     /// First of the columns of the sheet's shape.
     pub shape: Option<usize>,
+    /// First of the columns of the links to a robot: the poses X and Z, and the scale.
+    pub robot: Option<usize>,
     /// Number of columns of the shared unknowns: all of the above.
     pub shared: usize,
     /// First of the columns of the frames' poses; `None` if they are eliminated.
@@ -45,6 +47,7 @@ impl Layout {
         let panels = problem.panels.iter().map(|p| p.pose_free.then(|| take(6))).collect();
         let targets = problem.targets.iter().map(|t| t.pose_free.then(|| take(6))).collect();
         let shape = problem.shape.map(|_| take(shape::COUNT));
+        let robot = problem.robot.as_ref().map(|robot| take(robot.columns()));
         let shared = take(0);
         let of_frames = 6 * problem.frames.len();
         let of_corners = problem.map.as_ref().map(|map| 3 * map.len());
@@ -53,7 +56,7 @@ impl Layout {
             Some(of_corners) if of_corners <= of_frames => (None, Some(take(of_corners))),
             Some(_) => (Some(take(of_frames)), None),
         };
-        Self { parameters, cameras, panels, targets, shape, shared, frames, corners, count }
+        Self { parameters, cameras, panels, targets, shape, robot, shared, frames, corners, count }
     }
 }
 

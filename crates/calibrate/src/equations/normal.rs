@@ -81,6 +81,11 @@ impl Normal {
                 normal.add(layout, &local?, block.frame);
             }
         }
+        for frame in 0..problem.frames.len() {
+            if let Some(local) = Local::of_robot(problem, layout, frame) {
+                normal.add(layout, &local, frame);
+            }
+        }
         if let Some(map) = &problem.map {
             normal.add_map(map, layout, whitening.sigma);
         }
@@ -325,11 +330,14 @@ mod tests {
     use super::*;
     use crate::equations::factor::Factor;
     use crate::input::observation::Observation;
+    use crate::input::robot::{Mounting, RobotNoise};
+    use crate::problem::robot::Robot;
     use crate::problem::unknowns::Block;
     use crate::problem::unknowns::{CameraUnknowns, PanelUnknowns, Prior, TargetUnknowns};
     use crate::{PanelRef, Shape};
     use deltille_core::camera::{Camera, Pose};
     use deltille_core::damping::Damping;
+    use glam::DQuat;
     use glam::DVec2;
     use glam::DVec3;
     use nalgebra::Vector3;
@@ -339,12 +347,13 @@ mod tests {
         Rig,
         Scene,
         Bent,
+        Robot,
         Map { frames: usize },
     }
 
     /// Two cameras and two panels in three frames with noise, where every link is unknown that can
     /// be unknown; the same with a target for each panel; or one camera and a panel that is bent,
-    /// or whose corners are unknown.
+    /// that a robot moves, or whose corners are unknown.
     fn problem(kind: Kind) -> Problem {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let count = if matches!(kind, Kind::Rig | Kind::Scene) { 2 } else { 1 };
@@ -378,6 +387,7 @@ mod tests {
         let moments = match kind {
             Kind::Map { frames } => frames,
             Kind::Rig | Kind::Scene | Kind::Bent => 3,
+            Kind::Robot => 6,
         };
         let frames = (0..moments).map(|i| {
             let (sin, cos) = (2.4 * i as f64).sin_cos();
@@ -420,6 +430,29 @@ mod tests {
                 problem.blocks.push(block);
             }
         }
+        if kind == Kind::Robot {
+            let mut robot = Robot {
+                mounting: Mounting::EyeInHand,
+                mount_from_camera: turned,
+                ground_from_board: beside(400.0).after(&turned.inverse()),
+                scale: 1.01,
+                scale_free: true,
+                poses: Vec::new(),
+                noise: RobotNoise { rotation_rad: 0.01, translation_mm: 0.5 },
+                variance: 0.7,
+            };
+            let measured = problem.frames.iter().map(|frame| {
+                let mut any = |reach: f64| rng.random_range(-reach..reach);
+                let turn = DVec3::new(any(0.01), any(0.01), any(0.01));
+                let rotation = DQuat::from_scaled_axis(turn);
+                let translation = DVec3::new(any(0.5), any(0.5), any(0.5));
+                Pose { rotation, translation }.after(&robot.predicted(frame))
+            });
+            // A frame may have no link.
+            let measured = measured.enumerate().map(|(i, pose)| Some(pose).filter(|_| i != 2));
+            robot.poses = measured.collect();
+            problem.robot = Some(robot);
+        }
         if let Kind::Map { .. } = kind {
             let mut map = CornerMap::flat(&problem.blocks);
             for offset in &mut map.offsets_mm {
@@ -452,6 +485,14 @@ mod tests {
                 all.extend((half.transpose() * -off).iter());
             }
         }
+        if let Some(robot) = &problem.robot {
+            let roots = robot.weights().map(f64::sqrt);
+            for (frame, measured) in problem.frames.iter().zip(&robot.poses) {
+                let off = measured.map(|measured| robot.off(frame, &measured));
+                let off = off.into_iter().flatten().flat_map(|off| off.to_array());
+                all.extend(off.zip(&roots).map(|(off, root)| -off * root));
+            }
+        }
         if let Some(map) = &problem.map {
             let offsets = map.offsets_mm.iter();
             all.extend(offsets.flat_map(|&mm| (mm / map.prior_mm * whitening.sigma).to_array()));
@@ -473,7 +514,7 @@ mod tests {
     fn equations_match_finite_differences_of_the_residuals() {
         // With few frames corners are eliminated, with many frames the frames.
         let maps = [5, 12].map(|frames| Kind::Map { frames });
-        for kind in [Kind::Rig, Kind::Scene, Kind::Bent].into_iter().chain(maps) {
+        for kind in [Kind::Rig, Kind::Scene, Kind::Bent, Kind::Robot].into_iter().chain(maps) {
             let problem = problem(kind);
             let (layout, whitening) = (Layout::of(&problem), whitening(&problem));
             let normal = Normal::of(&problem, &layout, &whitening, Loss::Squared).unwrap();

@@ -48,6 +48,12 @@ impl Problem {
                 *mm += change;
             }
         }
+        if let (Some(robot), Some(first)) = (&mut problem.robot, layout.robot) {
+            let change = &step.shared.as_slice()[first..first + robot.columns()];
+            robot.mount_from_camera = moved(&robot.mount_from_camera, &change[..6]);
+            robot.ground_from_board = moved(&robot.ground_from_board, &change[6..12]);
+            robot.scale += change.get(12).unwrap_or(&0.0);
+        }
         for (frame, step) in problem.frames.iter_mut().zip(&step.frames) {
             *frame = moved(frame, step.as_slice());
         }

@@ -9,6 +9,7 @@
 //! 3. `observation` is the content of an image: corners of panels (`panel`).
 //! 4. `calibration` collects cameras with their views and the settings, including `loss` and
 //!    `weights`.
+//! 5. `robot` describes the poses of a robot that moves the camera or the board.
 //!
 //! `order` sorts the names of frames by their numbers, and `sample` selects evenly spaced items.
 
@@ -20,6 +21,7 @@ pub(crate) mod order;
 pub(crate) mod panel;
 pub(crate) mod photographs;
 pub(crate) mod reference;
+pub(crate) mod robot;
 pub(crate) mod sample;
 pub(crate) mod views;
 pub(crate) mod weights;

@@ -40,8 +40,8 @@ pub struct ViewSet {
 /// cameras taken at the same time have the same name.
 #[derive(Clone, Copy, Debug)]
 pub struct Named<'a> {
-    name: &'a str,
-    detection: &'a Detection,
+    pub(crate) name: &'a str,
+    pub(crate) detection: &'a Detection,
 }
 
 impl<'a> From<&'a Detection> for Named<'a> {

@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use super::corner_map::{CornerMap, MappedCorner};
+use super::robot::Robot;
 use super::shape::Shape;
 use super::unknowns::{Block, CameraUnknowns, PanelUnknowns, TargetUnknowns};
 use crate::cancel::Stop;
@@ -27,6 +28,8 @@ pub(crate) struct Problem {
     pub shape: Option<Shape>,
     /// The offset of each corner from its plan, if they are unknown.
     pub map: Option<CornerMap>,
+    /// The links of frames to a robot, if there are any.
+    pub robot: Option<Robot>,
     /// Flag that stops the calibration.
     pub stop: Stop,
 }
@@ -115,7 +118,8 @@ impl Problem {
             .blocks
             .iter()
             .filter_map(|block| Some(Block { frame: places[block.frame]?, ..block.clone() }));
-        Problem { frames, blocks: blocks.collect(), ..self.unknowns() }
+        let robot = self.robot.as_ref().map(|robot| robot.with_frames(&keep));
+        Problem { frames, robot, blocks: blocks.collect(), ..self.unknowns() }
     }
 }
 
@@ -175,10 +179,10 @@ impl Problem {
 
     /// The problem without observations.
     fn unknowns(&self) -> Problem {
-        let Problem { cameras, frames, targets, panels, shape, map, .. } = self;
+        let Problem { cameras, frames, targets, panels, shape, map, robot, .. } = self;
         let (cameras, frames, panels) = (cameras.clone(), frames.clone(), panels.clone());
         let (targets, map, stop) = (targets.clone(), map.clone(), self.stop.clone());
-        let (blocks, shape) = (Vec::new(), *shape);
-        Problem { cameras, frames, targets, panels, blocks, shape, map, stop }
+        let (blocks, shape, robot) = (Vec::new(), *shape, robot.clone());
+        Problem { cameras, frames, targets, panels, blocks, shape, map, robot, stop }
     }
 }

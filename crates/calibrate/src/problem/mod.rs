@@ -8,13 +8,15 @@
 //!    priors.
 //! 3. `bundle` combines them: points, residuals, and parts of the problem.
 //! 4. `whitening` weights residuals by covariances and one common variance.
-//! 5. `corner_gauge` removes from the offsets the directions that poses absorb.
+//! 5. `robot` links frames to the poses of a robot.
+//! 6. `corner_gauge` removes from the offsets the directions that poses absorb.
 
 pub(crate) mod bundle;
 pub(crate) mod camera_prior;
 pub(crate) mod corner_gauge;
 pub(crate) mod corner_map;
 pub(crate) mod panels;
+pub(crate) mod robot;
 pub(crate) mod roughness;
 pub(crate) mod shape;
 pub(crate) mod unknowns;

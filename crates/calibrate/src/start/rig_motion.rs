@@ -8,11 +8,15 @@
 //! ```
 //!
 //! where the first and the last link are the same in all frames. The equations of the rotations
-//! alone are linear in the two links (Shah 2013), and the positions follow from the rotations. If
-//! the rig rotates about one axis only, a shift of both along this axis is undetermined.
+//! alone are linear in the two links (Shah 2013), and the positions follow from the rotations. Three
+//! frames determine the rotations; the triple that agrees best with the median frame shows which frames are wrong. If the
+//! rig rotates about one axis only, a shift of both along this axis is undetermined.
 
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector6};
+use rand::SeedableRng;
+use rand::seq::index::sample;
+use rand_chacha::ChaCha8Rng;
 
 use crate::error::DegenerateMotion;
 use deltille_core::camera::Pose;
@@ -24,27 +28,26 @@ const MIN_ROTATION_RAD: f64 = 0.017;
 /// Number of reweighting iterations, in which frames that do not fit lose their weight.
 const ROUNDS: usize = 10;
 
-/// The observations of one frame: the pose of the rig from the other cameras, and the pose of the
+/// Number of triples of frames. If half of the frames are wrong, one in nine triples is right, so that all of them are
+/// wrong once in 10⁶ calibrations.
+const TRIPLES: usize = 120;
+
+/// The observations of one frame: the pose of the rig from the other cameras or a robot, and the pose of the
 /// target relative to the camera.
 #[derive(Clone, Copy)]
-pub(super) struct Moment {
+pub(crate) struct Moment {
     pub rig_from_scene: Pose,
     pub camera_from_target: Pose,
 }
 
-/// Computes `camera_from_rig` and `scene_from_target`.
-pub(super) fn placed_by_motion(moments: &[Moment]) -> Result<[Pose; 2], DegenerateMotion> {
-    check_rotations(moments)?;
-    let mut weights = vec![1.0; moments.len()];
-    let mut rotations = [DQuat::IDENTITY; 2];
+/// Computes `camera_from_rig` and `scene_from_target`. Up to half of the frames may be wrong.
+pub(crate) fn placed_by_motion(moments: &[Moment]) -> Result<[Pose; 2], DegenerateMotion> {
+    check_rotations(moments.iter().map(|moment| moment.rig_from_scene.rotation))?;
+    let mut rotations = agreeing_rotations(moments);
+    let mut weights = lighter(angles(moments, rotations));
     for _ in 0..ROUNDS {
         rotations = solved_rotations(moments, &weights);
-        let off = |moment: &Moment| {
-            let [camera, target] = rotations;
-            let predicted = camera * moment.rig_from_scene.rotation * target;
-            predicted.angle_between(moment.camera_from_target.rotation)
-        };
-        weights = lighter(moments.iter().map(off).collect());
+        weights = lighter(angles(moments, rotations));
     }
     let mut places = [DVec3::ZERO; 2];
     for _ in 0..ROUNDS {
@@ -63,26 +66,56 @@ fn posed(rotations: [DQuat; 2], places: [DVec3; 2]) -> [Pose; 2] {
     [0, 1].map(|i| Pose { rotation: rotations[i], translation: places[i] })
 }
 
-/// Returns an error if the rig did not rotate about two axes.
-fn check_rotations(moments: &[Moment]) -> Result<(), DegenerateMotion> {
-    let Some(first) = moments.first() else { return Err(DegenerateMotion::NoRotation) };
-    let back = first.rig_from_scene.rotation.conjugate();
-    let turns = moments.iter().map(|moment| {
-        let turn = back * moment.rig_from_scene.rotation;
-        (if turn.w < 0.0 { -turn } else { turn }).to_scaled_axis()
-    });
-    let mut scatter = Matrix3::zeros();
-    for turn in turns {
-        scatter += Matrix3::from_fn(|i, j| turn[i] * turn[j] / moments.len() as f64);
+/// The angle between measured and predicted rotation of each frame.
+fn angles(moments: &[Moment], [camera, target]: [DQuat; 2]) -> Vec<f64> {
+    let off = |moment: &Moment| {
+        let predicted = camera * moment.rig_from_scene.rotation * target;
+        predicted.angle_between(moment.camera_from_target.rotation)
+    };
+    moments.iter().map(off).collect()
+}
+
+/// The rotations from those three frames that agree best with the median frame.
+fn agreeing_rotations(moments: &[Moment]) -> [DQuat; 2] {
+    let mut random = ChaCha8Rng::seed_from_u64(0);
+    let of_triple = |_| {
+        let some = sample(&mut random, moments.len(), moments.len().min(3));
+        let some: Vec<Moment> = some.into_iter().map(|index| moments[index]).collect();
+        let rotations = solved_rotations(&some, &vec![1.0; some.len()]);
+        (median(angles(moments, rotations)).unwrap_or(f64::INFINITY), rotations)
+    };
+    let best = (0..TRIPLES).map(of_triple).min_by(|(one, _), (other, _)| one.total_cmp(other));
+    best.map_or([DQuat::IDENTITY; 2], |(_, rotations)| rotations)
+}
+
+/// Returns an error if these rotations are not about two axes.
+pub(crate) fn check_rotations(
+    rotations: impl IntoIterator<Item = DQuat>,
+) -> Result<(), DegenerateMotion> {
+    let [most, second, _] = rotation_spread(rotations).map(|(rms, _)| rms);
+    match (most < MIN_ROTATION_RAD, second < MIN_ROTATION_RAD) {
+        (true, _) => Err(DegenerateMotion::NoRotation),
+        (false, true) => Err(DegenerateMotion::OneAxis),
+        (false, false) => Ok(()),
     }
-    let mut rms: Vec<f64> =
-        scatter.symmetric_eigenvalues().iter().map(|v| v.max(0.0).sqrt()).collect();
-    rms.sort_by(f64::total_cmp);
-    match rms[..] {
-        [_, _, most] if most < MIN_ROTATION_RAD => Err(DegenerateMotion::NoRotation),
-        [_, second, _] if second < MIN_ROTATION_RAD => Err(DegenerateMotion::OneAxis),
-        _ => Ok(()),
+}
+
+/// The principal RMS angles of rotations, rad, relative to the first of them, with their axes; the largest first.
+pub(crate) fn rotation_spread(rotations: impl IntoIterator<Item = DQuat>) -> [(f64, DVec3); 3] {
+    let mut rotations = rotations.into_iter();
+    let back = rotations.next().unwrap_or(DQuat::IDENTITY).conjugate();
+    let (mut scatter, mut count) = (Matrix3::zeros(), 1.0);
+    for rotation in rotations {
+        let turn = rotation * back;
+        let turn = (if turn.w < 0.0 { -turn } else { turn }).to_scaled_axis();
+        scatter += Matrix3::from_fn(|i, j| turn[i] * turn[j]);
+        count += 1.0;
     }
+    let eigen = (scatter / count).symmetric_eigen();
+    let axis = |i: usize| DVec3::from_slice(eigen.eigenvectors.column(i).as_slice());
+    let mut spread = [0, 1, 2].map(|i| (eigen.eigenvalues[i].max(0.0).sqrt(), axis(i)));
+    spread.sort_by(|(one, _), (other, _)| other.total_cmp(one));
+    spread
 }
 
 /// Weights of frames by their residuals: frames with larger residuals than most have almost no influence.
@@ -158,14 +191,14 @@ mod tests {
         Pose { rotation: DQuat::from_scaled_axis(turn), translation }
     }
 
-    /// Frames of a rig that rotates up to these angles about each axis; every fifth is wrong.
+    /// Frames of a rig that rotates up to these angles about each axis; two of five are wrong.
     fn moments(random: &mut ChaCha8Rng, truth: [Pose; 2], reach: DVec3) -> Vec<Moment> {
         let [camera, target] = truth;
         let at = (0..30).map(|index| {
             let turn = reach * DVec3::from([0; 3].map(|_| random.random_range(-1.0..1.0)));
             let rig_from_scene = pose(random, turn);
             let camera_from_target = match index % 5 {
-                4 => pose(random, DVec3::ONE),
+                3 | 4 => pose(random, DVec3::ONE),
                 _ => camera.after(&rig_from_scene).after(&target),
             };
             Moment { rig_from_scene, camera_from_target }

@@ -1,0 +1,71 @@
+//! What poses may mean instead of what was stated, in words.
+
+use std::fmt;
+
+use crate::input::robot::Mounting;
+
+/// What poses may mean instead of what was stated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Misreading {
+    /// They are the inverse; equally, camera and board may be mounted the other way round.
+    Inverted,
+    /// The scalar part of quaternions is at the other end.
+    QuaternionOrder,
+    /// Angles are in degrees, not radians.
+    Degrees,
+    /// Angles are in radians, not degrees.
+    Radians,
+    /// Angles are rotations about moving axes x, y and z, not fixed ones.
+    AngleOrder,
+    /// Matrices are transposed.
+    Transposed,
+    /// Translations are in metres, not millimetres.
+    Metres,
+    /// Translations are in millimetres, not metres.
+    Millimetres,
+}
+
+impl fmt::Display for Misreading {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.look())
+    }
+}
+
+impl Misreading {
+    /// How the poses look.
+    pub(super) fn look(self) -> &'static str {
+        match self {
+            Self::Inverted => "inverted",
+            Self::QuaternionOrder => "as if w was at the wrong end of the quaternions",
+            Self::Degrees => "as if the angles were in degrees",
+            Self::Radians => "as if the angles were in radians",
+            Self::AngleOrder => "as if the angles were rotations about moving axes x, y, z",
+            Self::Transposed => "as if the rotation matrices were transposed",
+            Self::Metres => "as if the translations were in metres",
+            Self::Millimetres => "as if the translations were in millimetres",
+        }
+    }
+
+    /// What to change.
+    pub(super) fn remedy(self, mounting: Mounting) -> String {
+        match self {
+            Self::Inverted => {
+                let other = match mounting {
+                    Mounting::EyeInHand => "the board is on the flange (eye-to-hand)",
+                    Mounting::EyeToHand => "the camera is on the flange (eye-in-hand)",
+                };
+                format!("either they are flange_from_base, or {other}; state which")
+            }
+            Self::QuaternionOrder => {
+                "write quaternions in the order of their names, x y z w".to_owned()
+            }
+            Self::Degrees => "name the columns _deg".to_owned(),
+            Self::Radians => "name the columns _rad".to_owned(),
+            Self::AngleOrder => "convert them to quaternions or rotation vectors".to_owned(),
+            Self::Transposed => "write matrices by rows".to_owned(),
+            Self::Metres => "state that translations are in metres (_m)".to_owned(),
+            Self::Millimetres => "state that translations are in millimetres (_mm)".to_owned(),
+        }
+    }
+}

@@ -1,0 +1,273 @@
+//! The joint adjustment of camera, poses, mountings and the noise of the robot.
+
+use super::error::{HandEyeError, MIN_POSES};
+use super::estimate::{HandEye, HandEyeView};
+use super::noise::{self, Components, Links};
+use super::pairing::Pairing;
+use super::readings::{self, Paired, Start};
+use super::request::HandEyeRequest;
+use crate::adjust::reweighting::{Settled, variance};
+use crate::equations::minimise::{Minimum, Until, minimise};
+use crate::error::CalibrationError;
+use crate::estimate::values::CameraEstimate;
+use crate::input::calibration::Calibration;
+use crate::input::robot::RobotNoise;
+use crate::input::views::Named;
+use crate::matrix::Matrix;
+use crate::problem::bundle::Problem;
+use crate::problem::camera_prior::CameraPrior;
+use crate::problem::robot::Robot;
+use crate::problem::whitening::Whitening;
+use crate::start::rig_motion::{check_rotations, rotation_spread};
+use deltille_core::camera::{Lens, Pose};
+
+/// Maximum number of iterations in which the noise of the robot and the solution are estimated alternately; they agree after
+/// five to ten.
+const MAX_ROUNDS: usize = 30;
+
+impl Calibration {
+    /// Estimates where the camera and the board are mounted on a robot, jointly with the poses of the board, the intrinsics
+    /// and the noise of the robot. `detections` are those of all photographs, also without a target, in the order of the
+    /// robot's poses if these have neither names nor time stamps.
+    ///
+    /// Of a rig, the first camera is located.
+    ///
+    /// # Errors
+    /// Returns an error if the cameras cannot be calibrated, poses and photographs cannot be paired, or the poses do not
+    /// determine the mountings.
+    pub fn hand_eye<'a>(
+        &self,
+        asked: &HandEyeRequest,
+        detections: impl IntoIterator<Item = impl Into<Named<'a>>>,
+    ) -> Result<HandEye, HandEyeError> {
+        let photographs: Vec<Named<'_>> = detections.into_iter().map(Into::into).collect();
+        let pairing = Pairing::of(&asked.robot, &photographs)?;
+        let (mut estimate, settled) = self.settled()?;
+        if self.stop.is_raised() {
+            return Err(CalibrationError::Stopped.into());
+        }
+        estimate.calibrated_with.clone_from(&self.identities);
+        let Settled { minimum, whitening, .. } = settled;
+        let variance = variance(&minimum, &whitening, self.loss);
+        let of_frame = |frame: &crate::FrameEstimate| pairing.poses.get(&frame.name).copied();
+        let indices: Vec<Option<usize>> = estimate.frames.iter().map(of_frame).collect();
+        let paired: Vec<(usize, usize)> = indices
+            .iter()
+            .enumerate()
+            .filter_map(|(frame, pose)| Some((frame, (*pose)?)))
+            .collect();
+        if paired.len() < MIN_POSES {
+            return Err(HandEyeError::TooFew { paired: paired.len() });
+        }
+        let reported = |pose: usize| &asked.robot.poses[pose];
+        let to_base =
+            |pose: usize| readings::base_from_flange(reported(pose), asked.robot.are_inverse);
+        let rotation_spread =
+            rotation_spread(paired.iter().map(|&(_, pose)| to_base(pose).rotation));
+        let seen =
+            paired.iter().map(|&(frame, _)| minimum.problem.frames[frame].rotation.conjugate());
+        check_rotations(seen).map_err(|why| {
+            let axis = rotation_spread[0].1;
+            HandEyeError::Motion { why, axis, mounting: asked.mounting }
+        })?;
+        let start = readings::start(
+            &paired
+                .iter()
+                .map(|&(frame, pose)| Paired {
+                    robot: reported(pose),
+                    camera_from_board: minimum.problem.frames[frame],
+                })
+                .collect::<Vec<_>>(),
+            asked.mounting,
+            asked.robot.are_inverse,
+        )?;
+        let measured: Vec<Option<Pose>> = indices.iter().map(|pose| pose.map(to_base)).collect();
+        let problem = with_robot(minimum.problem, asked, start, &measured, variance);
+        let Joint { minimum, components } = adjusted(problem, &whitening, self, asked, &measured)?;
+        let Minimum { problem, normal, layout, .. } = &minimum;
+        let (Some(robot), Some(first)) = (&problem.robot, layout.robot) else {
+            return Err(HandEyeError::Undetermined);
+        };
+        let found = normal.covariances(layout).ok_or(HandEyeError::Undetermined)?;
+        let columns = first..first + robot.columns();
+        if found.loose.iter().any(|column| columns.contains(column)) {
+            return Err(HandEyeError::Undetermined);
+        }
+        let covariance = Matrix::from_fn(columns.len(), columns.len(), |i, j| {
+            found.shared[(first + i, first + j)] * variance
+        });
+        let names = || estimate.frames.iter().map(|frame| frame.name.clone());
+        let views = views(problem, robot, &measured, &indices, names());
+        let used = views.iter().filter(|view| view.is_used);
+        let (sum, count) = used.fold((0.0, 0.0), |(sum, n), v| (sum + v.rms_px.powi(2), n + 1.0));
+        for (camera, of) in estimate.cameras.iter_mut().zip(&problem.cameras) {
+            camera.camera = of.camera.clone();
+        }
+        Ok(HandEye {
+            mounting: asked.mounting,
+            mount_from_camera: robot.mount_from_camera,
+            ground_from_board: robot.ground_from_board,
+            covariance,
+            scale: robot.scale,
+            noise: robot.noise,
+            noise_freedom: asked.noise.is_none().then_some(components.freedom),
+            rotation_spread,
+            paired_by: pairing.by,
+            rms_px: (sum / f64::max(count, 1.0)).sqrt(),
+            views,
+            unpaired: pairing.unpaired,
+            spare_poses: asked.robot.poses.len() - pairing.poses.len(),
+            cameras: estimate,
+        })
+    }
+}
+
+/// The problem with the links to the robot, and with the parameters of a known camera unknown within their covariance.
+fn with_robot(
+    mut problem: Problem,
+    asked: &HandEyeRequest,
+    start: Start,
+    measured: &[Option<Pose>],
+    variance: f64,
+) -> Problem {
+    let mut robot = Robot {
+        mounting: asked.mounting,
+        mount_from_camera: start.mount_from_camera,
+        ground_from_board: start.ground_from_board,
+        scale: 1.0,
+        scale_free: asked.scale,
+        poses: measured.to_vec(),
+        noise: RobotNoise { rotation_rad: 1.0, translation_mm: 1.0 },
+        variance,
+    };
+    let off = problem.frames.iter().zip(measured).filter_map(|(frame, measured)| {
+        let off = robot.off(frame, measured.as_ref()?);
+        Some(off.map(|off| off.length()))
+    });
+    let first = noise::first(&off.collect::<Vec<_>>());
+    robot.noise = asked.noise.unwrap_or(first.noise);
+    problem.robot = Some(robot);
+    if let ([camera], Some(earlier)) = (problem.cameras.as_mut_slice(), &asked.earlier)
+        && !camera.free.contains(&true)
+        && let Some((free, prior)) = prior(earlier)
+    {
+        (camera.free, camera.prior) = (free, Some(prior));
+    }
+    problem
+}
+
+/// The parameters that an earlier calibration estimated, and their prior; `None` without a covariance.
+fn prior(earlier: &CameraEstimate) -> Option<(Vec<bool>, CameraPrior)> {
+    if matches!(earlier.camera.lens, Lens::Spline(_)) {
+        return None;
+    }
+    let free = earlier.free();
+    let observed = earlier.projection.as_ref().and_then(|known| known.observed.as_ref());
+    let covariance = observed.map_or(&earlier.covariance, |observed| &observed.covariance);
+    if covariance.rows() == 0 || covariance.rows() != free.len() {
+        return None;
+    }
+    let prior = CameraPrior::new(&earlier.camera, covariance.inner())?;
+    let count = earlier.camera.parameters().len();
+    Some(((0..count).map(|index| free.contains(&index)).collect(), prior))
+}
+
+/// The joint minimum.
+struct Joint {
+    minimum: Minimum,
+    components: Components,
+}
+
+/// Adjusts all unknowns, the noise of the robot, and the set of right poses, until they agree.
+fn adjusted(
+    mut problem: Problem,
+    whitening: &Whitening,
+    calibration: &Calibration,
+    asked: &HandEyeRequest,
+    measured: &[Option<Pose>],
+) -> Result<Joint, HandEyeError> {
+    let count = measured.iter().flatten().count() as f64;
+    let mut components = Components {
+        noise: problem.robot.as_ref().ok_or(HandEyeError::Undetermined)?.noise,
+        freedom: [3.0 * count - 6.0; 2],
+    };
+    let mut minimum = None;
+    let mut is_first = true;
+    for _ in 0..MAX_ROUNDS {
+        let found = minimise(problem, whitening, calibration.loss, Until::Fine);
+        let found = found.ok_or(match calibration.stop.is_raised() {
+            true => HandEyeError::Calibration(CalibrationError::Stopped),
+            false => HandEyeError::Undetermined,
+        })?;
+        let links = Links::of(&found, measured).ok_or(HandEyeError::Undetermined)?;
+        problem = found.problem.clone();
+        minimum = Some(found);
+        let robot = problem.robot.as_mut().ok_or(HandEyeError::Undetermined)?;
+        let right = links.right(&components);
+        let used = measured.iter().zip(&right).map(|(pose, right)| pose.filter(|_| *right));
+        let used: Vec<Option<Pose>> = used.collect();
+        if used.iter().flatten().count() < MIN_POSES {
+            break;
+        }
+        let is_same = used == robot.poses;
+        robot.poses = used;
+        let next = links.components(components.noise);
+        components.freedom = next.freedom;
+        // The first noise is robust; estimates are not, and begin without wrong poses.
+        let is_settled = asked.noise.is_some() || noise::are_equal(next.noise, components.noise);
+        if is_same && is_settled {
+            break;
+        }
+        if asked.noise.is_none() && (is_same || !is_first) {
+            components.noise = next.noise;
+            robot.noise = next.noise;
+        }
+        is_first = false;
+    }
+    let minimum = minimum.ok_or(HandEyeError::Undetermined)?;
+    Ok(Joint { minimum, components })
+}
+
+/// The frames with a pose of the robot.
+fn views(
+    problem: &Problem,
+    robot: &Robot,
+    measured: &[Option<Pose>],
+    indices: &[Option<usize>],
+    names: impl Iterator<Item = String>,
+) -> Vec<HandEyeView> {
+    let mut by_robot = problem.clone();
+    for (frame, measured) in by_robot.frames.iter_mut().zip(measured) {
+        if let Some(measured) = measured {
+            *frame = robot.seen(measured);
+        }
+    }
+    let [own, by_robot] = [problem, &by_robot].map(frame_rms_px);
+    let of_frame = |(frame, name): (usize, String)| {
+        let (pose, measured) = (indices[frame]?, measured[frame].as_ref()?);
+        let [rotation_rad, translation_mm] = robot.off(&problem.frames[frame], measured);
+        Some(HandEyeView {
+            name,
+            pose,
+            is_used: robot.poses[frame].is_some(),
+            rotation_rad,
+            translation_mm,
+            rms_px: own[frame],
+            robot_rms_px: by_robot[frame],
+        })
+    };
+    names.enumerate().filter_map(of_frame).collect()
+}
+
+/// RMS reprojection error of each frame per axis, px; infinite where a camera cannot see a corner.
+fn frame_rms_px(problem: &Problem) -> Vec<f64> {
+    let mut sums = vec![[0.0; 2]; problem.frames.len()];
+    for block in &problem.blocks {
+        for off in problem.residuals(block) {
+            let [sum, count] = &mut sums[block.frame];
+            *sum += off.map_or(f64::INFINITY, |off| off.length_squared());
+            *count += 2.0;
+        }
+    }
+    sums.into_iter().map(|[sum, count]| (sum / f64::max(count, 1.0)).sqrt()).collect()
+}
