@@ -39,7 +39,9 @@ pub use deltille_files::logo;
 #[cfg(feature = "report")]
 pub use deltille_files::report;
 #[cfg(feature = "files")]
-pub use deltille_files::{SheetUseError, camera_file, clock, export, limits, target_file};
+pub use deltille_files::{
+    SheetUseError, camera_file, clock, export, limits, robot_poses, target_file,
+};
 #[cfg(feature = "photographs")]
 pub use deltille_files::{photograph, remap};
 #[cfg(any(feature = "recordings", feature = "videos"))]

@@ -9,6 +9,7 @@
 //! | [`family_file`] | families by name or from their files |
 //! | [`target_file`] | targets from their files, with their families |
 //! | [`camera_file`] | cameras from their files |
+//! | [`robot_poses`] | poses of a robot from their files |
 //! | [`photograph`] | photographs in common formats as grey images |
 //! | `exif_notes` | the camera in the EXIF metadata of a photograph |
 //! | `remap` | photographs undistorted or rectified |
@@ -33,6 +34,7 @@ pub mod photograph;
 pub mod remap;
 #[cfg(feature = "report")]
 pub mod report;
+pub mod robot_poses;
 pub mod target_file;
 
 pub use known_print::SheetUseError;
