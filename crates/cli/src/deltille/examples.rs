@@ -94,6 +94,10 @@ pub const POSE: &str = "Examples:
   deltille pose photos --target desk/desk.json --camera camera.yaml
   deltille pose photo.png --target desk/desk.json --camera camera.yaml --all-images";
 
+pub const HAND_EYE: &str = "Examples:
+  deltille handeye photos --robot poses.csv --target desk/desk.json --camera camera.json
+  deltille handeye corners --robot poses.txt --target desk/desk.json --eye-to-hand -o handeye.json";
+
 pub const UNDISTORT: &str = "Examples:
   deltille undistort photos --camera camera.yaml -o straight
   deltille undistort run.mcap --topic /left/image_raw --every 30 --camera left.yaml -o straight";

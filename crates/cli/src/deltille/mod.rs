@@ -6,7 +6,7 @@
 //! 1. `make` plans and makes targets, and verifies their files.
 //! 2. `see` detects targets in photographs.
 //! 3. `calibrate` calibrates cameras and rigs from detections, proposes the next photograph, and compares results.
-//! 4. `apply` uses the calibrated cameras: target poses, undistorted images.
+//! 4. `apply` uses the calibrated cameras: target poses, robots, undistorted images.
 //! 5. `measure` evaluates the library itself.
 //!
 //! `files` contains the input and output shared by all of them, and `examples` the end of each command's help.
@@ -23,7 +23,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use self::apply::{check, pose, undistort};
+use self::apply::{check, hand_eye, pose, undistort};
 use self::calibrate::{compare, guide, one_camera, rig};
 use self::make::{aprilgrid, board, charuco, circles, plan, solid, verify};
 use self::measure::{bench, experiment};
@@ -129,6 +129,13 @@ enum Command {
     /// Estimate the pose of a target in photographs from a calibrated camera
     #[command(after_help = examples::POSE)]
     Pose(pose::Args),
+    /// Locate a camera and a board on a robot (hand–eye and robot–world calibration)
+    ///
+    /// The result are the poses of the camera on the flange and of the board in the base (eye-in-hand), or of the camera in
+    /// the base and of the board on the flange (--eye-to-hand). Poses and photographs are paired by name if each pose
+    /// names its photograph, else by time stamp, else by order.
+    #[command(name = "handeye", after_help = examples::HAND_EYE)]
+    HandEye(Box<hand_eye::Args>),
     /// Undistort images to a pinhole projection, or write the remap tables
     #[command(after_help = examples::UNDISTORT)]
     Undistort(undistort::Args),
@@ -155,6 +162,7 @@ pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
         Command::Check(args) => check::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Guide(args) => guide::run(*args),
+        Command::HandEye(args) => hand_eye::run(*args),
         Command::Plan(args) => plan::run(args),
         Command::Board(args) => board::run(GridKind::Deltille, *args),
         Command::Checkerboard(args) => board::run(GridKind::Checker, *args),

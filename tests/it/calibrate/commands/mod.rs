@@ -3,6 +3,7 @@
 mod cameras;
 mod names;
 mod rigs;
+mod robots;
 mod still_calibrated;
 
 use std::path::Path;

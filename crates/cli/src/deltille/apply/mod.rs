@@ -5,8 +5,10 @@
 //! 1. `pose`: the pose of a target in each photograph;
 //! 2. `undistort`: photographs undistorted to a pinhole projection, or the remap tables; for two cameras of a rig,
 //!    rectified images (`deltille rectify`);
-//! 3. `check`: whether the camera is still as calibrated.
+//! 3. `check`: whether the camera is still as calibrated;
+//! 4. `hand_eye`: where the camera and the board are mounted on a robot.
 
 pub mod check;
+pub mod hand_eye;
 pub mod pose;
 pub mod undistort;

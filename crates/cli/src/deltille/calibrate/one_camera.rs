@@ -87,7 +87,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     check_places(folder, &planned, args.overwrite)?;
     let page = args.solve.page(&stem, args.overwrite)?;
     let measure = args.solve.measures_target();
-    let Sightings { calibration, views, target, empty, left_out, print, unnamed } =
+    let Sightings { calibration, views, target, empty, left_out, print, unnamed, .. } =
         args.sightings.read(&intrinsics, measure)?;
     if let (Some(known), Some(printing)) = (&args.fixed_intrinsics, &target) {
         let targets = std::slice::from_ref(&printing.target);

@@ -117,6 +117,8 @@ pub struct Sightings {
     pub left_out: Vec<Excluded>,
     /// Known properties of the print.
     pub print: Print,
+    /// The detections of all images.
+    pub detections: Vec<(String, Detection)>,
     /// Note about detections that do not name their target.
     pub unnamed: Option<String>,
 }
@@ -187,7 +189,7 @@ impl SightingsArgs {
         let named = detections.iter().flat_map(|(_, found)| found.targets.clone());
         let calibration = Calibration::of(&reference, panels).named_by(named);
         let target = target.or(board.map(Printing::from));
-        Ok(Sightings { calibration, target, views, empty, left_out, print, unnamed })
+        Ok(Sightings { calibration, target, views, empty, left_out, print, detections, unnamed })
     }
 }
 

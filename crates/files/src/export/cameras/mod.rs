@@ -2,7 +2,7 @@
 //!
 //! [`calibration`] and [`rig`] write estimates with the records of `estimate`, `finding` and `motion`. [`saved`] reads them back;
 //! [`sheet`] reads only their data about the print. [`camera`] writes the formats of other programs, and `format` is the table of
-//! these formats. [`check`], [`comparison`], [`pose`], [`next_view`], [`undistortion`] and [`truth`] are the results of other commands.
+//! these formats. [`check`], [`comparison`], [`hand_eye`], [`pose`], [`next_view`], [`undistortion`] and [`truth`] are the results of other commands.
 
 pub mod calibration;
 pub mod camera;
@@ -11,6 +11,7 @@ pub mod comparison;
 pub(super) mod estimate;
 pub(super) mod finding;
 pub(super) mod format;
+pub mod hand_eye;
 pub(super) mod motion;
 pub mod next_view;
 pub mod pose;
