@@ -51,6 +51,7 @@ __all__ = [
     "FrameIterator",
     "Frames",
     "Grid",
+    "HandEye",
     "Icosahedron",
     "Located",
     "Motion",
@@ -85,6 +86,7 @@ __all__ = [
     "compare",
     "compare_rigs",
     "frames",
+    "hand_eye",
     "next_view",
     "pose",
     "render",
@@ -1187,6 +1189,50 @@ def check(
     assume_target: bool = False,
     board_accuracy_mm: float | None = None,
 ) -> Check: ...
+@final
+class HandEye:
+    @property
+    def setup(self) -> Literal["eye-in-hand", "eye-to-hand"]: ...
+    @property
+    def flange_from_camera(self) -> Pose: ...
+    @property
+    def base_from_board(self) -> Pose: ...
+    @property
+    def base_from_camera(self) -> Pose: ...
+    @property
+    def flange_from_board(self) -> Pose: ...
+    @property
+    def covariance(self) -> Floats: ...
+    @property
+    def scale(self) -> float: ...
+    @property
+    def scale_sd(self) -> float | None: ...
+    @property
+    def robot_noise(self) -> tuple[float, float]: ...
+    @property
+    def camera(self) -> Camera | None: ...
+    @property
+    def used(self) -> list[str]: ...
+    @property
+    def wrong(self) -> list[str]: ...
+    @property
+    def rms_px(self) -> float: ...
+    def to_json(self) -> str: ...
+
+def hand_eye(
+    detections: Iterable[Detection | Failure],
+    robot: Sequence[Pose | None] | AnyPath,
+    target: Target | Sequence[Target] | None = None,
+    *,
+    setup: Literal["eye-in-hand", "eye-to-hand"] = "eye-in-hand",
+    camera: CalibratedCamera | Camera | None = None,
+    model: str = "radtan",
+    inverse_poses: bool = False,
+    robot_noise: tuple[float, float] | None = None,
+    scale: bool = False,
+    print_scale: ArrayLike | None = None,
+    assume_target: bool = False,
+) -> HandEye: ...
 @final
 class Comparison:
     @property

@@ -65,6 +65,8 @@ mod _core {
     #[pymodule_export]
     use super::calibrate::next_view::{NextView, next_view};
     #[pymodule_export]
+    use super::calibrate::robots::{HandEye, hand_eye_of};
+    #[pymodule_export]
     use super::calibrate::views::{Diagnosis, Excluded, View};
     #[pymodule_export]
     use super::programs::_run;

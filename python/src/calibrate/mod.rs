@@ -10,6 +10,7 @@
 //! 5. `next_view` proposes the next view.
 //! 6. `comparison` tests whether two calibrations differ, and estimates the pose of a target.
 //! 7. `checking` tests whether cameras are still as calibrated, from a few new detections.
+//! 8. `robots` locates a camera and a board on a robot.
 
 pub mod calibrated_camera;
 pub mod calibration;
@@ -18,5 +19,6 @@ pub mod comparison;
 pub mod keywords;
 pub mod next_view;
 mod pickled;
+pub mod robots;
 mod solving;
 pub mod views;
