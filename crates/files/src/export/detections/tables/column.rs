@@ -19,6 +19,18 @@ pub(super) enum Kind {
     Flag,
 }
 
+impl Kind {
+    /// The words for a value of this kind.
+    pub(super) fn expected(self) -> &'static str {
+        match self {
+            Self::Text => "text",
+            Self::Signed | Self::Unsigned | Self::Long => "an integer",
+            Self::Real => "a number",
+            Self::Flag => "true or false",
+        }
+    }
+}
+
 /// A column.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Column {

@@ -4,7 +4,7 @@
 //! They contain all that a calibration needs. Individual tags and the duration of each stage are only in the JSON of a
 //! [detection](super::detection).
 //!
-//! `column` is the schema, and `write` and `read` use it. `pages` checks the stated sizes of a file before it is unpacked, and
+//! `column` is the schema, and `write` and `read` use it; `row` is a row that is read. `pages` checks the stated sizes of a file before it is unpacked, and
 //! `folder` finds the tables of a folder.
 //!
 //! ```
@@ -28,6 +28,7 @@ mod column;
 pub mod folder;
 mod pages;
 mod read;
+mod row;
 mod write;
 
 use deltille_core::detection::Detection;

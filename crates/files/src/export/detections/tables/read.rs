@@ -11,20 +11,18 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
 use parquet::file::reader::FileReader;
 use parquet::file::serialized_reader::SerializedFileReader;
-use serde::de::DeserializeOwned;
-use serde_json::{Map, Value};
 
-use super::column::{self, Cell, Column, Kind};
+use super::column::{self, Cell, Column};
+use super::row::Row;
 use super::write::kind_name;
 use super::{
     CORNERS_SCHEMA, EARLIER_IMAGES_SCHEMA, IMAGES_SCHEMA, ImageRecord, SCHEMA, TableError,
 };
 use crate::export::detections::detection;
 use crate::limits::{self, Broken, Kind as Limit, Limits};
-use deltille_core::detection::{Detection, Grid, GridCorner, InkEstimate, Reason, ToneEstimate};
+use deltille_core::detection::{Detection, Grid, GridCorner, Reason};
 use deltille_core::lattice::GridKind;
 use deltille_core::quantity;
-use deltille_core::quantity::Range;
 use deltille_core::raster::FileNotes;
 use deltille_core::targets::TargetIdentity;
 
@@ -34,9 +32,6 @@ const BATCH: usize = 4096;
 /// Approximate memory of a row, bytes. Repeated values take less in a file.
 const BYTES_PER_CORNER: u64 = 32;
 const BYTES_PER_IMAGE: u64 = 200;
-
-/// Maximum size of a text, for example the path of an image, bytes.
-const MAX_TEXT: usize = 10_000;
 
 /// The table that a file contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -451,7 +446,7 @@ impl Stream {
             ColumnReader::DoubleColumnReader(from) => cells(from, count, has_gaps, real),
             ColumnReader::ByteArrayColumnReader(from) => cells(from, count, has_gaps, Cell::Text),
             _ => {
-                let problem = format!("expected {}", name_of(self.column.kind));
+                let problem = format!("expected {}", self.column.kind.expected());
                 return Err(TableError::Column { column: self.column.name, problem });
             }
         };
@@ -488,117 +483,4 @@ fn cells<T: DataType>(
         }
     }
     Ok(cells)
-}
-
-fn name_of(kind: Kind) -> &'static str {
-    match kind {
-        Kind::Text => "text",
-        Kind::Signed | Kind::Unsigned | Kind::Long => "an integer",
-        Kind::Real => "a number",
-        Kind::Flag => "true or false",
-    }
-}
-
-/// A row of a table.
-struct Row<'a> {
-    number: u64,
-    columns: &'static [Column],
-    cells: &'a [Vec<Cell>],
-    row: usize,
-}
-
-impl<'a> Row<'a> {
-    fn cell(&self, at: usize) -> &'a Cell {
-        self.cells[at].get(self.row).unwrap_or(&Cell::None)
-    }
-
-    fn wrong(&self, at: usize, problem: impl ToString) -> TableError {
-        let (row, column) = (self.number, self.columns[at].name);
-        TableError::Cell { row, column, problem: problem.to_string() }
-    }
-
-    fn missing(&self, at: usize) -> TableError {
-        self.wrong(at, format!("expected {}", name_of(self.columns[at].kind)))
-    }
-
-    fn text(&self, at: usize) -> Result<Option<&'a str>, TableError> {
-        match self.cell(at) {
-            Cell::None => Ok(None),
-            Cell::Text(bytes) if bytes.len() > MAX_TEXT => {
-                Err(self.wrong(at, format!("text with more than {MAX_TEXT} bytes")))
-            }
-            Cell::Text(bytes) => {
-                let text = str::from_utf8(bytes.data());
-                text.map(Some).map_err(|_| self.wrong(at, "not UTF-8 text"))
-            }
-            _ => Err(self.missing(at)),
-        }
-    }
-
-    /// Returns an integer. It may be stored as floating-point, because some programs have no integers with missing values.
-    fn whole(&self, at: usize) -> Result<Option<i64>, TableError> {
-        match *self.cell(at) {
-            Cell::None => Ok(None),
-            Cell::Whole(value) => Ok(Some(value)),
-            Cell::Real(value) if value.fract() == 0.0 && value.abs() < 1e15 => {
-                Ok(Some(value as i64))
-            }
-            _ => Err(self.missing(at)),
-        }
-    }
-
-    fn unsigned(&self, at: usize) -> Result<Option<u32>, TableError> {
-        let value = self.whole(at)?.map(u32::try_from).transpose();
-        value.map_err(|_| self.wrong(at, "not an integer from 0 to 4294967295"))
-    }
-
-    fn real(&self, at: usize, range: Range) -> Result<Option<f64>, TableError> {
-        let value = match *self.cell(at) {
-            Cell::None => return Ok(None),
-            Cell::Real(value) => value,
-            Cell::Whole(value) => value as f64,
-            _ => return Err(self.missing(at)),
-        };
-        range.check(value).map(Some).map_err(|what| self.wrong(at, what))
-    }
-
-    fn flag(&self, at: usize) -> Result<Option<bool>, TableError> {
-        match *self.cell(at) {
-            Cell::None => Ok(None),
-            Cell::Flag(value) => Ok(Some(value)),
-            _ => Err(self.missing(at)),
-        }
-    }
-
-    fn tone(&self) -> Result<Option<ToneEstimate>, TableError> {
-        self.estimate(9, &["black", "white", "kappa", "kappa_sd", "kappa_odd", "used"])
-    }
-
-    fn ink(&self) -> Result<Option<InkEstimate>, TableError> {
-        let fields = ["edges", "edges_sd", "um", "um_sd", "used", "images"];
-        self.estimate(15, &fields)
-    }
-
-    /// Returns an estimate from consecutive columns starting at `at`, if the first has a value. It is read like JSON, which checks
-    /// the ranges.
-    fn estimate<T: DeserializeOwned>(
-        &self,
-        at: usize,
-        fields: &[&str],
-    ) -> Result<Option<T>, TableError> {
-        if *self.cell(at) == Cell::None {
-            return Ok(None);
-        }
-        let mut object = Map::new();
-        for (column, field) in (at..).zip(fields) {
-            let value = match self.columns[column].kind {
-                Kind::Flag => self.flag(column)?.map(Value::from),
-                Kind::Real => self.real(column, quantity::figure::RANGE)?.map(Value::from),
-                _ => self.unsigned(column)?.map(Value::from),
-            };
-            object.extend(value.map(|value| ((*field).to_owned(), value)));
-        }
-        let read = serde_json::from_value(Value::Object(object));
-        read.map(Some).map_err(|error| self.wrong(at, error))
-    }
 }
