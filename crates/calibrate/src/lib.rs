@@ -73,6 +73,7 @@ pub use diagnose::model_selection::{Alternative, Remedy};
 pub use diagnose::one_state::{BoardStretch, CameraChange, ChangedIntrinsic, RollingShutter};
 pub use error::{CalibrationError, DegenerateMotion};
 pub use estimate::coverage::Coverage;
+pub use estimate::depth::DepthUncertainty;
 pub use estimate::image_circle::ImageCircle;
 pub use estimate::lens_limit::LensLimit;
 pub use estimate::target_map::{CornerOffset, MIN_VIEWS_TO_MEASURE, TargetMap};

@@ -314,6 +314,44 @@ impl Rig {
         arrays::rows(py, self.solved.estimate.frames.iter().map(|frame| frame.pose_sd))
     }
 
+    /// Computes the uncertainty of distances that two cameras measure by triangulation.
+    ///
+    /// Parameters
+    /// ----------
+    /// first, second : str
+    ///     Names of the cameras.
+    /// distance_mm : float
+    ///     Distance of the points from the first camera, mm.
+    ///
+    /// Returns
+    /// -------
+    /// tuple of two floats, or None
+    ///     Standard deviation from the calibration, mm; and from noise of the pixels, mm for each px of noise per
+    ///     coordinate: RMS values over the points that both cameras see. ``None`` if not known, or if there are no such
+    ///     points.
+    fn depth_sd(
+        &self,
+        first: &str,
+        second: &str,
+        distance_mm: f64,
+    ) -> PyResult<Option<(f64, f64)>> {
+        let distance_mm = arrays::distance(Some(distance_mm))?.unwrap_or_default();
+        let cameras = &self.solved.estimate.cameras;
+        let index = |name: &str| {
+            let index = cameras.iter().position(|camera| camera.name == name);
+            index.ok_or_else(|| {
+                let names: Vec<&str> = cameras.iter().map(|camera| camera.name.as_str()).collect();
+                raised::CalibrationError::new_err(format!(
+                    "no camera is named {name} (cameras: {})",
+                    names.join(", ")
+                ))
+            })
+        };
+        let pair = [index(first)?, index(second)?];
+        let found = self.solved.estimate.depth_uncertainty(pair, distance_mm);
+        Ok(found.map(|found| (found.sd_mm, found.mm_per_px)))
+    }
+
     /// Reprojection error over all corners, px: RMS per axis.
     #[getter]
     fn rms_px(&self) -> f64 {

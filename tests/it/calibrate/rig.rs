@@ -15,6 +15,9 @@ use rand_distr::{Distribution, Normal};
 /// Standard deviation of the simulated corners, px.
 const NOISE_PX: f64 = 0.05;
 
+/// Distance of triangulated points from the first camera, mm.
+const DISTANCE_MM: f64 = 900.0;
+
 /// Placement errors of the panels, mm and rad.
 const PLACED_MM: f64 = 0.1;
 const PLACED_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
@@ -183,15 +186,44 @@ fn pose_errors(found: &Pose, truth: &Pose, sd: [f64; 6]) -> [f64; 6] {
     std::array::from_fn(|i| off[i] / sd[i])
 }
 
+/// Errors of triangulated distances in stated standard deviations: of the points that the first of two cameras sees at its
+/// image centre.
+fn depth_errors(truth: &Simulated, found: &Estimate) -> Vec<f64> {
+    let mut errors = Vec::new();
+    for [first, second] in [[0, 1], [0, 2], [1, 2]] {
+        let stated = found.depth_uncertainty([first, second], DISTANCE_MM).unwrap();
+        let rig_from_first = truth.camera_from_rig[first].inverse();
+        let centre = truth.cameras[first].centre_px;
+        let point = truth.cameras[first].unproject(centre).unwrap().direction * DISTANCE_MM;
+        let point = rig_from_first.apply(point);
+        let [one, other] = [first, second].map(|index| {
+            let seen = truth.cameras[index].project(truth.camera_from_rig[index].apply(point));
+            let camera = &found.cameras[index];
+            let rig_from_camera = camera.camera_from_rig.inverse();
+            let direction = camera.camera.unproject(seen.unwrap()).unwrap().direction;
+            (rig_from_camera.translation, rig_from_camera.rotation * direction)
+        });
+        // The place on the first ray that is nearest to the second.
+        let across = one.1.cross(other.1);
+        let distance = (other.0 - one.0).cross(other.1).dot(across) / across.length_squared();
+        errors.push((distance - DISTANCE_MM) / stated.sd_mm);
+    }
+    errors
+}
+
 /// Fraction of the errors within 3σ; 0.9973 for a normal distribution.
 fn honest(seeds: std::ops::Range<u64>, frames: usize) -> f64 {
-    let mut errors = Vec::new();
+    let (mut errors, mut depth) = (Vec::new(), Vec::new());
     for seed in seeds {
         let truth = simulated(seed, frames);
         let found = truth.solve(true);
         assert!((found.rms_px / NOISE_PX - 1.0).abs() < 0.1, "rms {}", found.rms_px);
         errors.extend(normalised_errors(&truth, &found));
+        depth.extend(depth_errors(&truth, &found));
     }
+    let mean = depth.iter().map(|error| error * error).sum::<f64>() / depth.len() as f64;
+    println!("triangulated distances: e²/σ² {mean:.2} in {}", depth.len());
+    errors.extend(depth);
     errors.iter().filter(|error| error.abs() < 3.0).count() as f64 / errors.len() as f64
 }
 

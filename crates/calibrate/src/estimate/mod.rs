@@ -5,11 +5,13 @@
 //! 1. `values` are cameras, targets, frames, views and corners with residuals.
 //! 2. `target_map` (measured corners), `coverage` (areas with corners), and `lens_limit` and
 //!    `image_circle` (extent of the lens) are parts of it.
-//! 3. `uncertainty_map` is the projection uncertainty of a camera over its image.
+//! 3. `uncertainty_map` is the projection uncertainty of a camera over its image, and `depth` that of distances that two
+//!    cameras measure.
 //! 4. `assemble` builds the estimate.
 
 pub(crate) mod assemble;
 pub(crate) mod coverage;
+pub(crate) mod depth;
 pub(crate) mod image_circle;
 pub(crate) mod lens_limit;
 pub(crate) mod target_map;

@@ -349,6 +349,14 @@ fn summary(solved: &Calibrated) -> String {
         ));
         lines.extend(projection_uncertainty(camera).map(|line| format!("{}: {line}", camera.name)));
     }
+    for ([first, second], depth) in estimate.depth_uncertainties() {
+        let [first, second] = [first, second].map(|index| &estimate.cameras[index].name);
+        lines.push(format!(
+            "{first} and {second}: triangulated distances at {:.0} mm: σ {:.4} mm from the calibration, and {:.3} mm for each \
+             px of noise",
+            depth.distance_mm, depth.sd_mm, depth.mm_per_px
+        ));
+    }
     for target in estimate.targets.iter().filter(|_| estimate.targets.len() > 1) {
         let at = target.scene_from_target.translation.to_array().map(|mm| fixed(mm, 2));
         let deviation = target.pose_sd.map_or(String::new(), |sd| within(&sd));

@@ -40,6 +40,8 @@ struct RigFile<'a> {
     cameras: Vec<Camera<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     joint: Option<JointRecord>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    depth: Vec<Depth<'a>>,
     frames: Vec<Frame<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     held_out: Option<HeldOut<'a>>,
@@ -87,6 +89,15 @@ struct Camera<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     observed_pose_sd: Option<[f64; 6]>,
     views: Vec<ViewRecord<'a>>,
+}
+
+/// The uncertainty of distances from the first of two cameras.
+#[derive(Serialize)]
+struct Depth<'a> {
+    cameras: [&'a str; 2],
+    distance_mm: f64,
+    sd_mm: f64,
+    mm_per_px: f64,
 }
 
 #[derive(Serialize)]
@@ -142,6 +153,7 @@ pub fn write(
         targets: targets(found),
         cameras: found.cameras.iter().map(|camera| of_camera(found, camera, residuals)).collect(),
         joint: found.joint.as_ref().map(joint),
+        depth: depth(found),
         frames: frames(found),
         held_out,
         excluded: &found.excluded,
@@ -149,6 +161,17 @@ pub fn write(
         diagnoses: diagnoses(found, said, print.scale),
     };
     json::to_text(&file, 4)
+}
+
+fn depth(found: &Estimate) -> Vec<Depth<'_>> {
+    let name = |index: usize| found.cameras[index].name.as_str();
+    let records = found.depth_uncertainties().into_iter().map(|(pair, of)| Depth {
+        cameras: pair.map(name),
+        distance_mm: of.distance_mm,
+        sd_mm: of.sd_mm,
+        mm_per_px: of.mm_per_px,
+    });
+    records.collect()
 }
 
 fn targets(found: &Estimate) -> Vec<TargetRecord<'_>> {
