@@ -98,13 +98,28 @@ impl Links {
         let freedom = now.freedom[0] + now.freedom[1];
         let is_right = |(link, used): (&Option<(Vector6<f64>, Matrix6<f64>)>, &bool)| {
             let Some((off, covariance)) = link else { return false };
-            // The prediction of a used link includes the link.
+            // The prediction of a used link includes the link. Robust weights of corners may make its covariance too large.
             let whole = if *used { own - covariance } else { own + covariance };
-            let Some(factor) = whole.cholesky() else { return true };
-            let squared = off.dot(&factor.solve(off));
-            f_p_value(squared / 6.0, 6.0, freedom.max(1.0)) > WRONG
+            let solved = whole
+                .cholesky()
+                .map_or_else(|| off.component_div(&own.diagonal()), |factor| factor.solve(off));
+            is_plausible(off.dot(&solved), freedom)
         };
         self.all.iter().zip(&self.used).map(is_right).collect()
+    }
+}
+
+/// Whether noise explains the squared length of a whitened residual.
+fn is_plausible(squared: f64, freedom: f64) -> bool {
+    f_p_value(squared / 6.0, 6.0, freedom.max(1.0)) > WRONG
+}
+
+impl Components {
+    /// Whether noise explains a residual of these lengths (rad, mm).
+    pub(super) fn explain(&self, [turn, step]: [f64; 2]) -> bool {
+        let RobotNoise { rotation_rad, translation_mm } = self.noise;
+        let squared = (turn / rotation_rad).powi(2) + (step / translation_mm).powi(2);
+        is_plausible(squared, self.freedom[0] + self.freedom[1])
     }
 }
 

@@ -140,11 +140,16 @@ fn with_robot(
         noise: RobotNoise { rotation_rad: 1.0, translation_mm: 1.0 },
         variance,
     };
-    let off = problem.frames.iter().zip(measured).filter_map(|(frame, measured)| {
+    let off = |(frame, measured): (&Pose, &Option<Pose>)| {
         let off = robot.off(frame, measured.as_ref()?);
         Some(off.map(|off| off.length()))
-    });
-    let first = noise::first(&off.collect::<Vec<_>>());
+    };
+    let off: Vec<Option<[f64; 2]>> = problem.frames.iter().zip(measured).map(off).collect();
+    // Wrong poses must not displace the frames of the photographs.
+    let first = noise::first(&off.iter().copied().flatten().collect::<Vec<_>>());
+    for (pose, off) in robot.poses.iter_mut().zip(off) {
+        *pose = pose.filter(|_| off.is_some_and(|off| first.explain(off)));
+    }
     robot.noise = asked.noise.unwrap_or(first.noise);
     problem.robot = Some(robot);
     if let ([camera], Some(earlier)) = (problem.cameras.as_mut_slice(), &asked.earlier)
@@ -192,7 +197,6 @@ fn adjusted(
         freedom: [3.0 * count - 6.0; 2],
     };
     let mut minimum = None;
-    let mut is_first = true;
     for _ in 0..MAX_ROUNDS {
         let found = minimise(problem, whitening, calibration.loss, Until::Fine);
         let found = found.ok_or(match calibration.stop.is_raised() {
@@ -213,16 +217,14 @@ fn adjusted(
         robot.poses = used;
         let next = links.components(components.noise);
         components.freedom = next.freedom;
-        // The first noise is robust; estimates are not, and begin without wrong poses.
         let is_settled = asked.noise.is_some() || noise::are_equal(next.noise, components.noise);
         if is_same && is_settled {
             break;
         }
-        if asked.noise.is_none() && (is_same || !is_first) {
+        if asked.noise.is_none() {
             components.noise = next.noise;
             robot.noise = next.noise;
         }
-        is_first = false;
     }
     let minimum = minimum.ok_or(HandEyeError::Undetermined)?;
     Ok(Joint { minimum, components })

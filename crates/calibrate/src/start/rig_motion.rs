@@ -81,11 +81,30 @@ fn agreeing_rotations(moments: &[Moment]) -> [DQuat; 2] {
     let of_triple = |_| {
         let some = sample(&mut random, moments.len(), moments.len().min(3));
         let some: Vec<Moment> = some.into_iter().map(|index| moments[index]).collect();
-        let rotations = solved_rotations(&some, &vec![1.0; some.len()]);
+        let rotations = rotations_of(&some);
         (median(angles(moments, rotations)).unwrap_or(f64::INFINITY), rotations)
     };
     let best = (0..TRIPLES).map(of_triple).min_by(|(one, _), (other, _)| one.total_cmp(other));
     best.map_or([DQuat::IDENTITY; 2], |(_, rotations)| rotations)
+}
+
+/// The rotations from a few frames: those of the target relative to the first frame are those of the rig about rotated axes
+/// (Park & Martin 1994).
+fn rotations_of(moments: &[Moment]) -> [DQuat; 2] {
+    let Some(first) = moments.first() else { return [DQuat::IDENTITY; 2] };
+    let turn = |now: DQuat, first: DQuat| {
+        let turn = now * first.conjugate();
+        (if turn.w < 0.0 { -turn } else { turn }).to_scaled_axis()
+    };
+    let mut correlation = Matrix3::zeros();
+    for now in &moments[1..] {
+        let seen = turn(now.camera_from_target.rotation, first.camera_from_target.rotation);
+        let rig = turn(now.rig_from_scene.rotation, first.rig_from_scene.rotation);
+        correlation += Matrix3::from_fn(|i, j| seen[i] * rig[j]);
+    }
+    let camera = nearest_rotation(correlation);
+    let target = (camera * first.rig_from_scene.rotation).conjugate();
+    [camera, target * first.camera_from_target.rotation]
 }
 
 /// Returns an error if these rotations are not about two axes.
