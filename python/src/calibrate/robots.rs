@@ -132,9 +132,9 @@ impl HandEye {
 
 /// Poses of a robot as an argument.
 #[derive(FromPyObject)]
-pub enum Robot {
+pub enum Robot<'py> {
     /// One for each detection; `None` where it is unknown.
-    Poses(Vec<Option<Pose>>),
+    Poses(Vec<Option<PyRef<'py, Pose>>>),
     /// A file.
     File(PathBuf),
 }
@@ -191,7 +191,7 @@ pub enum Known<'py> {
 pub fn hand_eye_of(
     py: Python<'_>,
     detections: Results<'_>,
-    robot: Robot,
+    robot: Robot<'_>,
     target: Option<Targets>,
     setup: &str,
     camera: Option<Known<'_>>,
@@ -254,7 +254,7 @@ pub fn hand_eye_of(
 }
 
 /// The poses of a robot; those of a sequence name their detections, so that some may be missing.
-fn poses(robot: Robot, given: &Named, count: usize) -> PyResult<RobotPoses> {
+fn poses(robot: Robot<'_>, given: &Named, count: usize) -> PyResult<RobotPoses> {
     let wrong = |what: String| raised::CalibrationError::new_err(what);
     let poses = match robot {
         Robot::File(path) => {

@@ -28,7 +28,7 @@ const MAX_ROUNDS: usize = 30;
 impl Calibration {
     /// Estimates where the camera and the board are mounted on a robot, jointly with the poses of the board, the intrinsics
     /// and the noise of the robot. `detections` are those of all photographs, also without a target, in the order of the
-    /// robot's poses if these have neither names nor time stamps.
+    /// robot's poses if these have no names and no time stamps.
     ///
     /// Of a rig, the first camera is located.
     ///
