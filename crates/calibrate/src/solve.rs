@@ -4,6 +4,9 @@ use super::error::CalibrationError;
 use super::estimate::values::Estimate;
 use super::input::calibration::{Calibration, CameraViews, TargetPanels};
 
+/// A measured target is tested with every third view, as the models are.
+const HELD_OUT: usize = 3;
+
 impl Calibration {
     /// Estimates the cameras, their relative poses, the poses of the target, and everything else that was requested.
     ///
@@ -52,9 +55,20 @@ impl Calibration {
                 error: Box::new(error),
             },
         })?;
-        let held_out = test.map(|test| test.given(&estimate).adjusted()).transpose()?;
-        let (held_out, calibrated_with) = (held_out.map(Box::new), self.identities.clone());
-        Ok(Estimate { held_out, calibrated_with, ..estimate })
+        let held_out = match test {
+            Some(test) => Some(Box::new(test.given(&estimate).adjusted()?)),
+            None if self.measure_target => self.cross_validated(),
+            None => None,
+        };
+        let calibrated_with = self.identities.clone();
+        let mut estimate = Estimate { held_out, calibrated_with, ..estimate };
+        estimate.findings.extend(estimate.of_measured_corners());
+        Ok(estimate)
+    }
+
+    /// Every third view with the map and the cameras of the others; `None` if these do not suffice for a calibration.
+    fn cross_validated(&self) -> Option<Box<Estimate>> {
+        self.clone().hold_out(Some(HELD_OUT)).solved().ok()?.held_out
     }
 
     /// The same calibration with everything fixed to the estimate except the poses of the target.

@@ -2,8 +2,8 @@
 //! none, and a measured target serves other calibrations.
 
 use deltille::calibrate::{
-    Calibration, CornerOffset, Estimate, Model, Observation, PanelPrior, PanelRef, Reference,
-    Sighting, TargetMap, UntaggedGrid, View,
+    Calibration, CornerOffset, Estimate, Messages, Model, Observation, OutlierPattern, PanelPrior,
+    PanelRef, Reference, Sighting, TargetMap, UntaggedGrid, View,
 };
 use deltille::camera::{Camera, Pose};
 use deltille::export::calibration::{self, Print, Residuals};
@@ -188,6 +188,48 @@ fn uncertainties_of_four_views_are_right() {
     assert!(of_corners.sqrt() < 1.5, "{}", of_corners.sqrt());
 }
 
+/// The findings about corners of the map, as kind, row, column and whether the observations are held out.
+fn named(found: &Estimate) -> Vec<(&'static str, i32, i32, bool)> {
+    let findings = found.findings.iter().filter_map(|finding| match finding.pattern {
+        OutlierPattern::Corner { row, col, is_held_out, .. } => {
+            Some((if finding.is_excluded { "left" } else { "seen" }, row, col, is_held_out))
+        }
+        OutlierPattern::Offset { row, col, .. } => Some(("offset", row, col, false)),
+        _ => None,
+    });
+    findings.collect()
+}
+
+/// A corner that lies elsewhere in a third of the views is measured from the others, and named; so is a corner that the
+/// print displaces by far more than others. On ordinary boards, none is named.
+#[test]
+fn wrong_corners_are_named() {
+    let measured = |wrong: bool, displaced: bool| {
+        let mut offsets = Sheet { random_mm: 0.05, bent_mm: 0.0 }.offsets(1, 3);
+        if displaced {
+            offsets[0][20] += DVec3::new(0.6, 0.0, 0.0);
+        }
+        let mut views = views(&[Pose::IDENTITY], &offsets, &Pose::IDENTITY, 12, 7000);
+        for view in views.iter_mut().skip(2).step_by(3).filter(|_| wrong) {
+            view.sightings[0].observations[40].pixel += DVec2::new(1.0, 0.5);
+        }
+        of(views).measure_target(true).solve().unwrap()
+    };
+    assert_eq!(named(&measured(false, false)), []);
+    let found = measured(true, true);
+    assert_eq!(named(&found), [("seen", 4, 4, true), ("offset", 2, 2, false)]);
+    let words = Messages::new(&found, None);
+    let said: Vec<String> = found.findings.iter().map(|finding| words.finding(finding)).collect();
+    assert!(
+        said[0].starts_with("corner in row 4, column 4: 4 of 4 observations in held-out views"),
+        "{said:?}"
+    );
+    assert!(said[1].starts_with("corner in row 2, column 2: displaced by 0."), "{said:?}");
+    let right = measured(false, true);
+    let at = |of: &Estimate| of.map.as_ref().unwrap().offset_mm(PanelRef::ONLY, 4, 4);
+    assert!(at(&found).distance(at(&right)) < 0.02, "{} {}", at(&found), at(&right));
+}
+
 /// A corner at a different position in most views is not measured.
 #[test]
 fn a_corner_that_rests_on_outliers_is_not_measured() {
@@ -198,8 +240,9 @@ fn a_corner_that_rests_on_outliers_is_not_measured() {
         view.sightings[0].observations[40].pixel += (1.0 + index as f64) * DVec2::new(sin, cos);
     }
     let found = of(views).measure_target(true).solve().unwrap();
+    assert_eq!(named(&found), [("left", 40 / SIDE, 40 % SIDE, false)]);
     let map = found.map.unwrap();
-    assert_eq!((map.few, map.corners().len()), (1, (SIDE * SIDE - 1) as usize));
+    assert_eq!((map.not_measured.len(), map.corners().len()), (1, (SIDE * SIDE - 1) as usize));
     assert_eq!(map.offset_mm(PanelRef::ONLY, 40 / SIDE, 40 % SIDE), DVec3::ZERO);
 }
 

@@ -66,6 +66,30 @@ pub enum OutlierPattern {
         /// Its lower right corner, px.
         to_px: DVec2,
     },
+    /// A corner of a measured target.
+    Corner {
+        /// The panel.
+        panel: PanelRef,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+        /// RMS residual per axis of all its observations, px.
+        rms_px: f64,
+        /// Whether these are observations in held-out views.
+        is_held_out: bool,
+    },
+    /// The measured offset of a corner, among those of all corners.
+    Offset {
+        /// The panel.
+        panel: PanelRef,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+        /// Its length, mm.
+        offset_mm: f64,
+    },
     /// A camera of a rig.
     Camera {
         /// Index of the camera.
@@ -107,7 +131,7 @@ type Cell = (usize, [i32; 2]);
 
 /// Numbers of outliers and of corners.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Count {
+pub(crate) struct Count {
     pub outliers: usize,
     pub corners: usize,
 }
@@ -116,6 +140,12 @@ impl Count {
     pub(crate) fn add(&mut self, outlier: bool) {
         self.corners += 1;
         self.outliers += usize::from(outlier);
+    }
+
+    /// The sum of both.
+    pub(crate) fn with(self, other: Self) -> Self {
+        let (outliers, corners) = (self.outliers + other.outliers, self.corners + other.corners);
+        Self { outliers, corners }
     }
 
     pub(crate) fn share(self) -> f64 {

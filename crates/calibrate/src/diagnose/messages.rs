@@ -204,11 +204,43 @@ impl<'a> Messages<'a> {
                     of(camera, where_)
                 )
             }
+            OutlierPattern::Corner { panel, row, col, rms_px, is_held_out } => {
+                let views = if *is_held_out { " in held-out views" } else { "" };
+                let who = self.corner(*panel, *row, *col);
+                let count = format!("{outliers} of {}", counted(*corners, "observation"));
+                if *is_excluded {
+                    return format!(
+                        "{who}: not measured, because most of its observations are outliers ({count}, {rms_px:.3} px \
+                         RMS) or fewer than two are usable: it keeps its planned position"
+                    );
+                }
+                format!(
+                    "{who}: {count}{views} are outliers ({rms_px:.3} px RMS), more than of other corners: the corner is \
+                     damaged or covered, or only it reaches a part of the image in which the model does not fit the lens"
+                )
+            }
+            OutlierPattern::Offset { panel, row, col, offset_mm } => {
+                let usual = self.estimate.map.as_ref().map_or(0.0, |map| map.expected_mm[0]);
+                format!(
+                    "{}: displaced by {offset_mm:.3} mm, more than the {usual:.3} mm of the other corners explain: inspect \
+                     the print there",
+                    self.corner(*panel, *row, *col)
+                )
+            }
             OutlierPattern::Camera { camera } => {
                 format!("{}: {count}", of(camera, "all views".to_owned()))
             }
         };
         if *is_excluded { text + "; excluded" } else { text }
+    }
+
+    /// The name of a corner of the target.
+    fn corner(&self, panel: PanelRef, row: i32, col: i32) -> String {
+        let of_panel = match self.estimate.panels.len() {
+            1 => String::new(),
+            _ => format!("panel {panel}, "),
+        };
+        format!("{of_panel}corner in row {row}, column {col}")
     }
 
     fn remedied(&self, camera: usize, remedy: &Remedy) -> String {

@@ -369,7 +369,9 @@ fn target_map(
     let map = problem.map.as_ref()?;
     let covariances = map.without_gauge(covariances, settled.whitening.sigma, problem);
     let weights = weights(map, settled, loss);
-    let few = weights.iter().filter(|of| of.1 > 0 && rests_on_few(of)).count();
+    let labels = map.corners.iter().map(|corner| (corner.panel, corner.row, corner.col));
+    let left = labels.zip(&weights).filter(|(_, of)| of.1 > 0 && rests_on_few(of));
+    let not_measured = left.map(|(label, _)| label).collect();
     let corners =
         map.corners.iter().zip(&map.offsets_mm).zip(covariances).zip(map.views(&problem.blocks));
     let all = corners.zip(&weights).enumerate();
@@ -394,7 +396,7 @@ fn target_map(
     });
     let expected_mm = [map.prior_mm.x, map.prior_mm.z];
     let mut map = TargetMap::new(corners.collect(), expected_mm);
-    map.few = few;
+    map.not_measured = not_measured;
     Some(map)
 }
 

@@ -8,8 +8,10 @@
 //! 3. `uncertainty_map` is the projection uncertainty of a camera over its image, and `depth` that of distances that two
 //!    cameras measure.
 //! 4. `assemble` builds the estimate.
+//! 5. `corner_check` finds the corners of a measured target that their observations contradict.
 
 pub(crate) mod assemble;
+pub(crate) mod corner_check;
 pub(crate) mod coverage;
 pub(crate) mod depth;
 pub(crate) mod image_circle;

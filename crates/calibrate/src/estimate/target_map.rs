@@ -22,9 +22,9 @@ pub struct TargetMap {
     /// The estimated standard deviation of the offsets in the plane of the panels and out of it, mm. Corners seen in
     /// few views are shrunk towards zero accordingly.
     pub expected_mm: [f64; 2],
-    /// Number of detected corners that are not in the map because their positions would depend on
+    /// Detected corners, by panel, row and column, that are not in the map because their positions would depend on
     /// outliers: fewer than two of their observations are inliers, or fewer than half.
-    pub few: usize,
+    pub not_measured: Vec<(PanelRef, i32, i32)>,
 }
 
 /// The measured offset of a corner from its plan.
@@ -51,13 +51,13 @@ pub struct CornerOffset {
 pub const MIN_VIEWS_TO_MEASURE: usize = 8;
 
 /// Probability that any corner of a perfect target is reported as off.
-const FALSE_ALARM: f64 = 0.01;
+pub(super) const FALSE_ALARM: f64 = 0.01;
 
 impl TargetMap {
     /// Creates a map of these corners; `expected_mm` as in [`Self::expected_mm`].
     pub fn new(mut corners: Vec<CornerOffset>, expected_mm: [f64; 2]) -> Self {
         corners.sort_by_key(CornerOffset::label);
-        Self { corners, expected_mm, few: 0 }
+        Self { corners, expected_mm, not_measured: Vec::new() }
     }
 
     /// The measured corners, by panel, row and column.
@@ -92,12 +92,13 @@ impl TargetMap {
 
     /// The map of these panels only.
     pub(crate) fn of_panels(&self, panels: &Range<usize>) -> Self {
-        let own = self.corners.iter().filter(|corner| panels.contains(&corner.panel.index()));
-        let own = own.map(|corner| {
-            let panel = PanelRef::new(corner.panel.index() - panels.start, corner.panel.id());
-            CornerOffset { panel, ..*corner }
-        });
-        Self { corners: own.collect(), expected_mm: self.expected_mm, few: self.few }
+        let is_own = |panel: PanelRef| panels.contains(&panel.index());
+        let renumbered = |panel: PanelRef| PanelRef::new(panel.index() - panels.start, panel.id());
+        let own = self.corners.iter().filter(|corner| is_own(corner.panel));
+        let own = own.map(|corner| CornerOffset { panel: renumbered(corner.panel), ..*corner });
+        let left = self.not_measured.iter().filter(|(panel, ..)| is_own(*panel));
+        let left = left.map(|&(panel, row, col)| (renumbered(panel), row, col));
+        Self { corners: own.collect(), expected_mm: self.expected_mm, not_measured: left.collect() }
     }
 
     /// Finds the corner with a label.

@@ -60,7 +60,9 @@ pub struct Estimate {
     pub findings: Vec<Finding>,
     /// Patterns in the residuals that noise does not explain, the strongest first.
     pub lack_of_fit: Vec<LackOfFit>,
-    /// The same cameras in the held-out frames, if there are any; only the poses of the target were estimated there.
+    /// The same cameras in the held-out frames, if there are any; only the poses of the target were estimated there. If
+    /// the corners of the target were estimated and no frames were to be held out, these are every third frame, with the
+    /// cameras and corners of another calibration without these frames.
     pub held_out: Option<Box<Estimate>>,
     /// Observed covariance of all cameras of a rig together: for each camera its estimated parameters, then (ω, τ) of
     /// [`camera_from_rig`](CameraEstimate::camera_from_rig) about the camera's axes (rad, mm) if it was estimated. `None`

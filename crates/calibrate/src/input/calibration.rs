@@ -255,7 +255,8 @@ impl Calibration {
     }
 
     /// Sets whether the position of every corner of the target is estimated, see
-    /// [`Estimate::map`](crate::Estimate::map).
+    /// [`Estimate::map`](crate::Estimate::map). Unless frames are [held out](Self::hold_out), a second calibration
+    /// without every third frame provides [held-out residuals](crate::Estimate::held_out).
     #[must_use]
     pub fn measure_target(self, measure_target: bool) -> Self {
         Self { measure_target, ..self }

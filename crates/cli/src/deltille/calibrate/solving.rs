@@ -406,12 +406,9 @@ fn mapped(map: &TargetMap, views: usize) -> String {
             )
         }
     };
-    let left = match map.few {
+    let left = match map.not_measured.len() {
         0 => String::new(),
-        few => format!(
-            "; {} not measured (most observations are outliers, or fewer than two are usable)",
-            counted(few, "corner")
-        ),
+        left => format!("; {} not measured", counted(left, "corner")),
     };
     format!(
         "target: corners deviate by {plane:.3} mm in the plane and {out:.3} mm out of it (RMS per axis), {} of {} \

@@ -359,10 +359,14 @@ struct OffsetRecord<'a> {
     offset_mm: [f64; 3],
     covariance_mm2: &'a [[f64; 3]; 3],
     views: usize,
+    /// RMS residual per axis in held-out views, px.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    held_out_px: Option<f64>,
 }
 
 /// The record of the measured corners of a target.
 pub(in crate::export) fn map<'a>(estimate: &'a Estimate, found: &'a TargetMap) -> MapRecord<'a> {
+    let held_out = estimate.held_out.as_ref().map(|test| test.rms_of_corners()).unwrap_or_default();
     let corners = found.corners().iter().map(|corner| OffsetRecord {
         target: estimate.target_name(corner.panel),
         panel: corner.panel,
@@ -372,6 +376,7 @@ pub(in crate::export) fn map<'a>(estimate: &'a Estimate, found: &'a TargetMap) -
         offset_mm: corner.offset_mm.to_array(),
         covariance_mm2: &corner.covariance_mm2,
         views: corner.views,
+        held_out_px: held_out.get(&(corner.panel, corner.row, corner.col)).copied(),
     });
     MapRecord {
         expected_mm: found.expected_mm,

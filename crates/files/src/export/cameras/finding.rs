@@ -17,6 +17,15 @@ pub(in crate::export) struct FindingRecord {
     /// Left, top, right, bottom.
     #[serde(skip_serializing_if = "Option::is_none")]
     region_px: Option<[f64; 4]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    row: Option<i32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    col: Option<i32>,
+    /// Whether the observations are in held-out views.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    held_out: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rms_px: Option<f64>,
     outliers: usize,
     corners: usize,
     excluded: bool,
@@ -77,6 +86,23 @@ pub(in crate::export) fn records(
                 kind: "region",
                 camera: name(*camera),
                 region_px: Some([from_px.x, from_px.y, to_px.x, to_px.y]),
+                ..counts
+            },
+            OutlierPattern::Corner { panel, row, col, rms_px, is_held_out } => FindingRecord {
+                kind: "corner",
+                panel: Some(*panel),
+                row: Some(*row),
+                col: Some(*col),
+                held_out: Some(*is_held_out),
+                rms_px: Some(*rms_px),
+                ..counts
+            },
+            OutlierPattern::Offset { panel, row, col, offset_mm } => FindingRecord {
+                kind: "offset",
+                panel: Some(*panel),
+                row: Some(*row),
+                col: Some(*col),
+                displacement_mm: Some(*offset_mm),
                 ..counts
             },
             OutlierPattern::Camera { camera } => {
