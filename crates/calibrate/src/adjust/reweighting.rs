@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 
 use crate::equations::factor::Factor;
-use crate::equations::minimise::{Minimum, Until, minimise, minimise_with};
+use crate::equations::minimise::{Minimum, Until, minimise_with};
 use crate::error::CalibrationError;
 use crate::input::loss::Loss;
 use crate::input::observation::{MIN_CORNERS, Observation};
@@ -44,12 +44,6 @@ const IN_THE_GAP: f64 = 0.25;
 const SMOOTH: f64 = 0.5;
 const FALLS_OFF: f64 = 0.05;
 const MIN_SMOOTH_SIGMA: f64 = 3.0;
-
-/// A gross outlier of a measured target is used if its residual then falls below this fraction of
-/// its value: it determines more of the estimate at its place than all other corners together, for
-/// example the lens in a part of the image that only this corner reaches. A wrong position of a
-/// corner in fewer than half of its views stays above it.
-const SELF_DETERMINED: f64 = 0.5;
 
 /// The parts of a problem that agree with each other.
 #[derive(Clone, Debug)]
@@ -131,44 +125,12 @@ pub(crate) fn settle(
             break;
         }
     }
-    // Offsets of corners absorb the smooth residuals of a wrong lens, except at its rim. Corners that
-    // determine the estimate alone count in full: a robust loss would reduce their weight until the
-    // estimate fits the other corners only.
-    let (mut loss, without) = (loss, deviations(&all, &whitening));
-    let mut tried = none;
-    while all.map.is_some() && gross.iter().flatten().any(|gross| *gross) {
-        let used = counting(&all, &tried);
-        let weights = whitening.of(&used);
-        let Some(with) = minimise(used, &weights, Loss::Squared, Until::Rough) else { break };
-        let with = all.at(&with.problem);
-        let contradicted = contradicted(&gross, &without, &deviations(&with, &whitening));
-        if contradicted == gross {
-            break;
-        }
-        (all, loss) = (with, Loss::Squared);
-        (tried, gross) = (contradicted.clone(), contradicted);
-        part = counting(&all, &gross);
-    }
-    if loss == Loss::Squared {
-        whitening = Whitening::fit(&part, weights, &residuals(&part));
-    }
     let minimum = minimise_with(factor, part, &whitening, loss, Until::Fine).ok_or_else(start)?;
     let problem = all.at(&minimum.problem);
     let limit = whitening.outlier_limit();
     let of_block = |off: Vec<f64>| off.into_iter().map(|off| off > limit).collect();
     let outliers = deviations(&problem, &whitening).into_iter().map(of_block).collect();
     Ok(Settled { minimum, whitening, problem, outliers })
-}
-
-/// The gross outliers that remain far off when they are used: the residuals `without` and `with` them.
-fn contradicted(gross: &[Vec<bool>], without: &[Vec<f64>], with: &[Vec<f64>]) -> Vec<Vec<bool>> {
-    let of_block = |((gross, without), with): ((&Vec<bool>, &Vec<f64>), &Vec<f64>)| {
-        let corners = gross.iter().zip(without.iter().zip(with));
-        corners
-            .map(|(&gross, (without, with))| gross && *with > SELF_DETERMINED * without)
-            .collect()
-    };
-    gross.iter().zip(without).zip(with).map(of_block).collect()
 }
 
 /// Marks the gross outliers of each block. Every frame keeps at least the corners with the smallest
