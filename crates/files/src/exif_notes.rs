@@ -98,7 +98,7 @@ mod tests {
         let phone = camera(PILLOW.to_vec()).unwrap();
         assert_eq!(phone.lens, text("iPhone 15 Pro back triple camera 6.765mm f/1.78"));
         assert_eq!(phone.focal_mm, Some(6.764_999_866));
-        assert_eq!((phone.focal_35mm_mm, phone.serial), (Some(24.0), None));
+        assert_eq!((phone.focal_35mm_mm, phone.serial.clone()), (Some(24.0), None));
         let photograph = camera_in(Cursor::new(HEIC)).unwrap();
         assert_eq!(photograph.model, text("iPhone 15 Pro"));
         assert_eq!(camera_in(Cursor::new(&HEIC[..400])), None);

@@ -31,10 +31,13 @@ const MAX_CHANGE: f64 = 10.0;
 /// Change of a standard deviation that is small compared with its own uncertainty.
 const SETTLED: f64 = 0.01;
 
+/// The residual of a frame, and the covariance of its prediction.
+type Residual = (Vector6<f64>, Matrix6<f64>);
+
 /// The residuals of all frames.
 pub(super) struct Links {
-    /// Residual of each frame with a pose of the robot, and the covariance of its prediction.
-    all: Vec<Option<(Vector6<f64>, Matrix6<f64>)>>,
+    /// Of each frame with a pose of the robot.
+    all: Vec<Option<Residual>>,
     used: Vec<bool>,
 }
 
@@ -63,7 +66,7 @@ impl Links {
         Some(Self { all: all.collect(), used: robot.poses.iter().map(Option::is_some).collect() })
     }
 
-    fn used(&self) -> impl Iterator<Item = &(Vector6<f64>, Matrix6<f64>)> {
+    fn used(&self) -> impl Iterator<Item = &Residual> {
         let used = self.all.iter().zip(&self.used).filter(|(_, used)| **used);
         used.filter_map(|(link, _)| link.as_ref())
     }
@@ -96,7 +99,7 @@ impl Links {
         let [turn, step] = [rotation_rad, translation_mm].map(|sd| sd * sd);
         let own = Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, step, step, step));
         let freedom = now.freedom[0] + now.freedom[1];
-        let is_right = |(link, used): (&Option<(Vector6<f64>, Matrix6<f64>)>, &bool)| {
+        let is_right = |(link, used): (&Option<Residual>, &bool)| {
             let Some((off, covariance)) = link else { return false };
             // The prediction of a used link includes the link. Robust weights of corners may make its covariance too large.
             let whole = if *used { own - covariance } else { own + covariance };

@@ -102,7 +102,7 @@ impl Fit {
 struct Reading {
     is_inverted: bool,
     length: Option<Misreading>,
-    rotation: Option<(Misreading, fn(RobotRotation) -> RobotRotation)>,
+    rotation: Option<OtherRotation>,
 }
 
 impl Reading {
@@ -144,6 +144,7 @@ impl Reading {
     }
 }
 
+/// Another meaning of rotations, and the rotation in this meaning.
 type OtherRotation = (Misreading, fn(RobotRotation) -> RobotRotation);
 
 /// Other readings of a rotation in this notation.
