@@ -172,6 +172,11 @@ def test_rigs(board, camera, tmp_path):
     numpy.testing.assert_allclose(found.cameras["right"].pose.tvec, left_from_right.tvec, atol=1)
     assert numpy.isnan(found.cameras["left"].pose_sd).all() and found.cameras["right"].pose_sd.shape == (6,)
     assert len(found.poses) == 6 and found.pose_sd.shape == (6, 6) and found.rms_px < 0.02
+    sd_mm, mm_per_px = found.depth_sd("left", "right", 600)
+    # Twice as far, noise counts four times.
+    assert sd_mm > 0 and 3.5 < found.depth_sd("left", "right", 1200)[1] / mm_per_px < 4.5
+    with pytest.raises(deltille.CalibrationError, match="no camera is named up"):
+        found.depth_sd("left", "up", 600)
     path = found.save(tmp_path / "rig.json", residuals=True)
     again = deltille.Rig.load(path, target=board)
     assert again.cameras["left"].camera == found.cameras["left"].camera
