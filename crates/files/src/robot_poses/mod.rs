@@ -30,6 +30,7 @@ use std::path::{Path, PathBuf};
 use deltille_calibrate::RobotPoses;
 
 use crate::limits::{Limits, ReadError};
+use deltille_core::quantity::position_mm;
 
 /// Error of reading poses.
 #[derive(Debug, thiserror::Error)]
@@ -96,10 +97,16 @@ pub fn parse(text: &str) -> Result<RobotPoses, Problem> {
     } else {
         return Err(Problem::of_file(UNKNOWN));
     };
-    match found.poses.is_empty() {
-        true => Err(Problem::of_file("the file contains no poses")),
-        false => Ok(found),
+    if found.poses.is_empty() {
+        return Err(Problem::of_file("the file contains no poses"));
     }
+    for (index, pose) in found.poses.iter().enumerate() {
+        for coordinate in pose.translation_mm.to_array() {
+            let wrong = |why| Problem::of_file(format!("translation of pose {}: {why}", index + 1));
+            position_mm::RANGE.check(coordinate).map_err(wrong)?;
+        }
+    }
+    Ok(found)
 }
 
 const UNKNOWN: &str = "these are not poses of a robot: use CSV with named columns, JSON, TUM (t x y z qx qy qz qw), or messages \
