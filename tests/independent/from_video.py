@@ -28,7 +28,7 @@ from photograph import PX_PER_MM, Page
 WIDTH, HEIGHT = 1280, 720
 CAMERA = {"fx": 1010.0, "fy": 1011.5, "cx": 650.0, "cy": 352.0, "k1": -0.18, "k2": 0.06}
 FISHEYE = {"fx": 560.0, "fy": 561.0, "cx": 650.0, "cy": 352.0, "k1": -0.02, "k2": 0.004}
-POSES, FRAMES_MOVING, RATE = 16, 20, 30
+POSES, FRAMES_MOVING, RATE = 20, 20, 30
 BLUR_PX, NOISE = 0.7, 1.5
 FINE = 2
 

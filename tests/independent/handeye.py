@@ -169,6 +169,7 @@ def compared(name, count, rotation_deg, translation_mm, fixed_camera, runs, *opt
         said, poses = cell.found()
         noise.append([said["robot_noise"]["rotation_deg"], said["robot_noise"]["translation_mm"]])
         assert all(view["used"] for view in said["views"]), (seed, run.stderr)
+        assert not said["findings"], (seed, run.stderr)
         variances = np.diag(said["covariance"])
         own = [off(found, truth) for found, truth in zip(poses, [cell.x, cell.z])]
         ratios.append(np.concatenate(own) ** 2 / variances[:12])
@@ -198,11 +199,11 @@ def conventions():
     for fixed_camera in (False, True):
         cell = Cell(np.random.default_rng(7), fixed_camera, 14, 0.02, 0.1)
 
-        def said(text, change=lambda pose: pose, write=None, code=2):
+        def said(text, change=lambda pose: pose, write=None, code=2, options=()):
             cell.write(change=change)
             if write:
                 write()
-            run = cell.deltille()
+            run = cell.deltille(*options)
             assert run.returncode == code, (run.returncode, run.stderr, run.stdout)
             assert text in run.stderr, (text, run.stderr)
             return run
@@ -225,6 +226,12 @@ def conventions():
         said("column x has no unit", write=header("image,x,y,z,qx,qy,qz,qw"))
         shuffled = lambda lines: [lines[0]] + [a.split(",", 1)[0] + "," + b.split(",", 1)[1] for a, b in zip(lines[1:], lines[4:] + lines[1:4])]
         said("do not agree with the photographs", write=edited(shuffled))
+        said("has a pose of its own", change=lambda pose: cell.robot[0])
+        scaled = lambda pose, by: np.vstack([np.column_stack([pose[:3, :3], pose[:3, 3] * by]), [0, 0, 0, 1]])
+        said("multiplied by 0.9", change=lambda pose: scaled(pose, 1 / 0.99), code=0)
+        said("given noise of the robot does not explain", code=0, options=["--robot-noise", "0.2deg,1mm"])
+        said("given noise of the robot", code=2, options=["--robot-noise", "0.0002deg,0.001mm"])
+        assert "warning" not in said("", code=0, options=["--robot-noise", "0.02deg,0.1mm"]).stderr
         said("only 2 photographs have", write=edited(lambda lines: lines[:3]))
         # Two poses of other photographs.
         def swapped(lines):

@@ -82,6 +82,7 @@ pub use estimate::values::{
     CameraEstimate, Corner, Estimate, FrameEstimate, Parameter, TargetEstimate, ViewEstimate,
 };
 pub use excluded::{Excluded, Reason};
+pub use hand_eye::contradictions::Contradiction;
 pub use hand_eye::error::HandEyeError;
 pub use hand_eye::estimate::{HandEye, HandEyeView};
 pub use hand_eye::misreading::Misreading;

@@ -162,6 +162,13 @@ impl Check {
         self.0.rms_px
     }
 
+    /// Names of two cameras whose detections contradict the calibration, and agree with it if they are exchanged; ``None``
+    /// if there are none.
+    #[getter]
+    fn exchanged(&self) -> Option<(&str, &str)> {
+        self.0.exchanged.as_ref().map(|[a, b]| (a.as_str(), b.as_str()))
+    }
+
     /// Returns the text that ``deltille check -o`` writes.
     fn to_json(&self) -> String {
         check::write(&self.0)

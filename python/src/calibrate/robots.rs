@@ -95,6 +95,13 @@ impl HandEye {
         (self.0.noise.rotation_rad.to_degrees(), self.0.noise.translation_mm)
     }
 
+    /// Statements about the robot that the detections contradict (the scale of its translations, ``robot_noise``), in
+    /// sentences.
+    #[getter]
+    fn findings(&self) -> Vec<String> {
+        self.0.contradictions.iter().map(ToString::to_string).collect()
+    }
+
     /// The camera, with its parameters after the adjustment.
     #[getter]
     fn camera(&self) -> Option<Camera> {
@@ -216,9 +223,9 @@ pub fn hand_eye_of(
         rotation_rad: degrees.to_radians(),
         translation_mm,
     });
-    let is_valid = |sd: f64| sd.is_finite() && sd > 0.0;
-    if noise.is_some_and(|of| !is_valid(of.rotation_rad) || !is_valid(of.translation_mm)) {
-        return Err(wrong("robot_noise: both standard deviations must be above 0".to_owned()));
+    if noise.is_some_and(|noise| !noise.is_valid()) {
+        let what = "robot_noise: expected 0.0001° to 57° and 0.001 mm to 1000 mm";
+        return Err(wrong(what.to_owned()));
     }
     let earlier: Option<CameraEstimate> = camera.map(|camera| match camera {
         Known::Calibrated(camera) => camera.estimate().clone(),

@@ -307,4 +307,6 @@ pub struct Check {
     pub rms_px: f64,
     /// Image size of the camera and of its views, px: of the first camera for which they differ, else of the first.
     pub sizes_px: [[u32; 2]; 2],
+    /// Two cameras whose views contradict the calibration, and agree with it if they are exchanged.
+    pub exchanged: Option<[String; 2]>,
 }

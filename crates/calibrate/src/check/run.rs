@@ -16,6 +16,30 @@ impl Calibration {
     /// calibration, the views, the panels and [`board_accuracy_mm`](Self::board_accuracy_mm) are used; intrinsics are
     /// ignored. Views of several cameras that were taken at the same time have the same name.
     pub fn check(&self, before: &Estimate) -> Check {
+        let found = self.checked(before);
+        let is_unfit = found.missing.iter().any(|missing| matches!(missing, Missing::Fit { .. }));
+        let exchanged = match found.answer == Answer::Changed || is_unfit {
+            true => self.exchanged(before),
+            false => None,
+        };
+        Check { exchanged, ..found }
+    }
+
+    /// The names of two cameras whose views agree with the calibration if they are exchanged.
+    fn exchanged(&self, before: &Estimate) -> Option<[String; 2]> {
+        let pairs = (0..self.cameras.len()).flat_map(|b| (0..b).map(move |a| [a, b]));
+        let agree = |&[a, b]: &[usize; 2]| {
+            let mut cameras = self.cameras.clone();
+            cameras[a].views.clone_from(&self.cameras[b].views);
+            cameras[b].views.clone_from(&self.cameras[a].views);
+            let found = self.of_cameras(cameras).checked(before);
+            let is_open = |missing: &Missing| matches!(missing, Missing::Undetermined { .. });
+            found.answer != Answer::Changed && found.missing.iter().all(is_open)
+        };
+        pairs.into_iter().find(agree).map(|pair| pair.map(|of| before.cameras[of].name.clone()))
+    }
+
+    fn checked(&self, before: &Estimate) -> Check {
         let sizes = before.cameras.iter().zip(&self.cameras).filter_map(|(known, of)| {
             let size_px = [known.camera.width, known.camera.height];
             Some((&known.name, size_px, of.views.first()?.size_px))
@@ -80,6 +104,7 @@ fn undecided(missing: Vec<Missing>) -> Check {
         corners: 0,
         rms_px: 0.0,
         sizes_px: [[0; 2]; 2],
+        exchanged: None,
     }
 }
 

@@ -56,20 +56,28 @@ pub enum HandEyeError {
         /// Where the camera is mounted.
         mounting: Mounting,
     },
+    /// The board rotates in the photographs, and the poses do not.
+    #[error(
+        "the robot's poses rotate less or about fewer axes than the board in the photographs: check that each photograph \
+         has a pose of its own"
+    )]
+    Still,
     /// Poses that fit only if they mean something else than was stated.
-    #[error("{}", misread(readings, *mounting, *times))]
+    #[error("{}", misread(readings, *mounting, *are_inverse, *times))]
     Misread {
         /// What has to be changed so that they fit.
         readings: Vec<Misreading>,
         /// Where the camera was said to be mounted.
         mounting: Mounting,
+        /// Whether the poses were said to be `flange_from_base`.
+        are_inverse: bool,
         /// How many times smaller the errors of the poses then are.
         times: f64,
     },
     /// Poses that fit the photographs no better than in a wrong order.
     #[error(
         "the robot's poses do not agree with the photographs in any convention: check that each pose belongs to its \
-         photograph (typical error {}, {} with the poses in a wrong order)",
+         photograph (typical error {}; {} if poses and photographs are exchanged)",
         shown_mm(*typical_mm), shown_mm(*shuffled_mm)
     )]
     NoAgreement {
@@ -78,6 +86,12 @@ pub enum HandEyeError {
         /// The same with the poses in a wrong order.
         shuffled_mm: f64,
     },
+    /// The given noise is impossible, or so small that the poses contradict each other.
+    #[error(
+        "the given noise of the robot is impossible, or so small that the poses contradict each other: it must be between \
+         0.0001° and 57° and between 0.001 mm and 1000 mm; state a larger one, or let it be estimated"
+    )]
+    Noise,
     /// The equations have no solution.
     #[error("the poses do not determine the mountings: rotate the flange more, about two axes")]
     Undetermined,
@@ -107,10 +121,10 @@ fn shown_mm(mm: f64) -> String {
     }
 }
 
-fn misread(readings: &[Misreading], mounting: Mounting, times: f64) -> String {
+fn misread(readings: &[Misreading], mounting: Mounting, are_inverse: bool, times: f64) -> String {
     let [looks, remedies]: [Vec<String>; 2] = [
         readings.iter().map(|of| of.look().to_owned()).collect(),
-        readings.iter().map(|of| of.remedy(mounting)).collect(),
+        readings.iter().map(|of| of.remedy(mounting, are_inverse)).collect(),
     ];
     let times = match times {
         1000.0.. => "errors are more than 1000 times smaller".to_owned(),

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::contradictions::Contradiction;
 use super::pairing::PairedBy;
 use crate::estimate::values::Estimate;
 use crate::input::robot::{Mounting, RobotNoise};
@@ -26,6 +27,8 @@ pub struct HandEye {
     pub noise: RobotNoise,
     /// Degrees of freedom of its rotation and translation; `None` if the noise was given.
     pub noise_freedom: Option<[f64; 2]>,
+    /// What the photographs contradict of what was stated about the robot.
+    pub contradictions: Vec<Contradiction>,
     /// RMS angles of the rotations of the flange about their principal axes, rad, with these axes in the frame of the base;
     /// the largest first. The second should be 10° or more.
     pub rotation_spread: [(f64, DVec3); 3],

@@ -48,14 +48,15 @@ impl Misreading {
     }
 
     /// What to change.
-    pub(super) fn remedy(self, mounting: Mounting) -> String {
+    pub(super) fn remedy(self, mounting: Mounting, are_inverse: bool) -> String {
         match self {
             Self::Inverted => {
                 let other = match mounting {
                     Mounting::EyeInHand => "the board is on the flange (eye-to-hand)",
                     Mounting::EyeToHand => "the camera is on the flange (eye-in-hand)",
                 };
-                format!("either they are flange_from_base, or {other}; state which")
+                let own = if are_inverse { "base_from_flange" } else { "flange_from_base" };
+                format!("either they are {own}, or {other}; state which")
             }
             Self::QuaternionOrder => {
                 "write quaternions in the order of their names, x y z w".to_owned()
@@ -64,8 +65,8 @@ impl Misreading {
             Self::Radians => "name the columns _rad".to_owned(),
             Self::AngleOrder => "convert them to quaternions or rotation vectors".to_owned(),
             Self::Transposed => "write matrices by rows".to_owned(),
-            Self::Metres => "state that translations are in metres (_m)".to_owned(),
-            Self::Millimetres => "state that translations are in millimetres (_mm)".to_owned(),
+            Self::Metres => "name the columns _m, or multiply them by 1000".to_owned(),
+            Self::Millimetres => "name the columns _mm, or divide them by 1000".to_owned(),
         }
     }
 }

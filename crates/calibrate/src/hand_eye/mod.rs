@@ -8,8 +8,10 @@
 //! 3. `readings` computes initial mountings by consensus, and recognises poses that are inverted or in other units
 //!    (`misreading`).
 //! 4. `noise` estimates the noise of the robot as variance components, and finds wrong poses.
-//! 5. `run` adjusts everything together; `estimate` has the result as values.
+//! 5. `run` adjusts everything together; `contradictions` tests what was stated about the robot; `estimate` has the result as
+//!    values.
 
+pub(crate) mod contradictions;
 pub(crate) mod error;
 pub(crate) mod estimate;
 pub(crate) mod misreading;

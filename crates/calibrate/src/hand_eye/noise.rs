@@ -20,7 +20,7 @@ use deltille_core::statistics::{f_p_value, median};
 const MIN_NOISE: [f64; 2] = [1e-6, 1e-3];
 
 /// Probability of a residual beyond which a pose is wrong: that of a corner beyond 5σ.
-const WRONG: f64 = 4e-6;
+pub(super) const WRONG: f64 = 4e-6;
 
 /// The median of a squared length in space, for coordinates with variance 1.
 const MEDIAN_OF_CHI_SQUARED_3: f64 = 2.366;

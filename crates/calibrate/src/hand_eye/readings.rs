@@ -62,7 +62,12 @@ pub(super) fn start(
     let least = better.iter().map(|(_, fit)| fit.error_mm).fold(f64::INFINITY, f64::min);
     if let Some((reading, fit)) = better.iter().find(|(_, fit)| fit.error_mm <= BETTER * least) {
         let times = stated.error_mm / fit.error_mm;
-        return Err(HandEyeError::Misread { readings: reading.differences(), mounting, times });
+        return Err(HandEyeError::Misread {
+            readings: reading.differences(),
+            mounting,
+            are_inverse,
+            times,
+        });
     }
     let shuffled_mm = Fit::of(&moments(&Reading::STATED, paired.len() / 2)).error_mm;
     match stated.places {

@@ -1,5 +1,6 @@
 //! The joint adjustment of camera, poses, mountings and the noise of the robot.
 
+use super::contradictions::{self, Contradiction};
 use super::error::{HandEyeError, MIN_POSES};
 use super::estimate::{HandEye, HandEyeView};
 use super::noise::{self, Components, Links};
@@ -40,6 +41,9 @@ impl Calibration {
         asked: &HandEyeRequest,
         detections: impl IntoIterator<Item = impl Into<Named<'a>>>,
     ) -> Result<HandEye, HandEyeError> {
+        if asked.noise.is_some_and(|noise| !noise.is_valid()) {
+            return Err(HandEyeError::Noise);
+        }
         let photographs: Vec<Named<'_>> = detections.into_iter().map(Into::into).collect();
         let pairing = Pairing::of(&asked.robot, &photographs)?;
         let (mut estimate, settled) = self.settled()?;
@@ -80,22 +84,20 @@ impl Calibration {
                 .collect::<Vec<_>>(),
             asked.mounting,
             asked.robot.are_inverse,
-        )?;
+        )
+        .map_err(|error| {
+            match check_rotations(paired.iter().map(|&(_, pose)| to_base(pose).rotation)) {
+                Err(_) if matches!(error, HandEyeError::NoAgreement { .. }) => HandEyeError::Still,
+                _ => error,
+            }
+        })?;
         let measured: Vec<Option<Pose>> = indices.iter().map(|pose| pose.map(to_base)).collect();
         let problem = with_robot(minimum.problem, asked, start, &measured, variance);
-        let Joint { minimum, components } = adjusted(problem, &whitening, self, asked, &measured)?;
-        let Minimum { problem, normal, layout, .. } = &minimum;
-        let (Some(robot), Some(first)) = (&problem.robot, layout.robot) else {
-            return Err(HandEyeError::Undetermined);
-        };
-        let found = normal.covariances(layout).ok_or(HandEyeError::Undetermined)?;
-        let columns = first..first + robot.columns();
-        if found.loose.iter().any(|column| columns.contains(column)) {
-            return Err(HandEyeError::Undetermined);
-        }
-        let covariance = Matrix::from_fn(columns.len(), columns.len(), |i, j| {
-            found.shared[(first + i, first + j)] * variance
-        });
+        let joint = adjusted(problem, &whitening, self, asked.noise, &measured)?;
+        let covariance = joint.covariance(variance).ok_or(HandEyeError::Undetermined)?;
+        let contradictions = contradictions(&joint, &whitening, self, asked, &measured);
+        let problem = &joint.minimum.problem;
+        let robot = problem.robot.as_ref().ok_or(HandEyeError::Undetermined)?;
         let names = || estimate.frames.iter().map(|frame| frame.name.clone());
         let views = views(problem, robot, &measured, &indices, names());
         let used = views.iter().filter(|view| view.is_used);
@@ -110,7 +112,8 @@ impl Calibration {
             covariance,
             scale: robot.scale,
             noise: robot.noise,
-            noise_freedom: asked.noise.is_none().then_some(components.freedom),
+            noise_freedom: asked.noise.is_none().then_some(joint.components.freedom),
+            contradictions,
             rotation_spread,
             paired_by: pairing.by,
             rms_px: (sum / f64::max(count, 1.0)).sqrt(),
@@ -183,12 +186,57 @@ struct Joint {
     components: Components,
 }
 
+impl Joint {
+    /// The covariance of mountings and scale; `None` if they are not determined.
+    fn covariance(&self, variance: f64) -> Option<Matrix> {
+        let Minimum { problem, normal, layout, .. } = &self.minimum;
+        let (robot, first) = (problem.robot.as_ref()?, layout.robot?);
+        let found = normal.covariances(layout)?;
+        let columns = first..first + robot.columns();
+        if found.loose.iter().any(|column| columns.contains(column)) {
+            return None;
+        }
+        Some(Matrix::from_fn(columns.len(), columns.len(), |i, j| {
+            found.shared[(first + i, first + j)] * variance
+        }))
+    }
+}
+
+/// What the photographs contradict of the stated scale and noise.
+fn contradictions(
+    joint: &Joint,
+    whitening: &Whitening,
+    calibration: &Calibration,
+    asked: &HandEyeRequest,
+    measured: &[Option<Pose>],
+) -> Vec<Contradiction> {
+    if asked.scale && asked.noise.is_none() {
+        return Vec::new();
+    }
+    let mut problem = joint.minimum.problem.clone();
+    let Some(robot) = &mut problem.robot else { return Vec::new() };
+    robot.scale_free = true;
+    let variance = robot.variance;
+    let Ok(freed) = adjusted(problem, whitening, calibration, None, measured) else {
+        return Vec::new();
+    };
+    let Some(robot) = &freed.minimum.problem.robot else { return Vec::new() };
+    let freedom = freed.components.freedom;
+    let sd = freed.covariance(variance).map(|of| of[(of.rows() - 1, of.rows() - 1)].sqrt());
+    let of_scale = sd
+        .filter(|_| !asked.scale)
+        .and_then(|sd| contradictions::of_scale(robot.scale, sd, freedom[1]));
+    let of_noise =
+        asked.noise.and_then(|given| contradictions::of_noise(given, robot.noise, freedom));
+    of_scale.into_iter().chain(of_noise).collect()
+}
+
 /// Adjusts all unknowns, the noise of the robot, and the set of right poses, until they agree.
 fn adjusted(
     mut problem: Problem,
     whitening: &Whitening,
     calibration: &Calibration,
-    asked: &HandEyeRequest,
+    noise: Option<RobotNoise>,
     measured: &[Option<Pose>],
 ) -> Result<Joint, HandEyeError> {
     let count = measured.iter().flatten().count() as f64;
@@ -211,17 +259,20 @@ fn adjusted(
         let used = measured.iter().zip(&right).map(|(pose, right)| pose.filter(|_| *right));
         let used: Vec<Option<Pose>> = used.collect();
         if used.iter().flatten().count() < MIN_POSES {
-            break;
+            match noise {
+                Some(_) => return Err(HandEyeError::Noise),
+                None => break,
+            }
         }
         let is_same = used == robot.poses;
         robot.poses = used;
         let next = links.components(components.noise);
         components.freedom = next.freedom;
-        let is_settled = asked.noise.is_some() || noise::are_equal(next.noise, components.noise);
+        let is_settled = noise.is_some() || noise::are_equal(next.noise, components.noise);
         if is_same && is_settled {
             break;
         }
-        if asked.noise.is_none() {
+        if noise.is_none() {
             components.noise = next.noise;
             robot.noise = next.noise;
         }

@@ -106,3 +106,10 @@ pub struct RobotNoise {
     /// Of the position of the flange along each axis, mm.
     pub translation_mm: f64,
 }
+
+impl RobotNoise {
+    /// Whether both are at least those of the best encoders, and below any useful ones: 10⁻⁶ to 1 rad and 10⁻³ to 10³ mm.
+    pub fn is_valid(&self) -> bool {
+        (1e-6..=1.0).contains(&self.rotation_rad) && (1e-3..=1e3).contains(&self.translation_mm)
+    }
+}

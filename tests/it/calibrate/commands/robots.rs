@@ -127,7 +127,36 @@ fn poses_that_cannot_be_used_are_refused() {
     }
     said(&inverse, "the robot's poses look inverted");
     done(at, &format!("{HAND_EYE} --inverse-poses"));
+    std::fs::write(at.join("poses.csv"), &table).unwrap();
+    refused(at, &format!("{HAND_EYE} --inverse-poses"), &["either they are base_from_flange"]);
+    let same: String = (0..18).map(|index| line(&format!("{index:02}"), &poses[0])).collect();
+    said(&(HEADER.to_owned() + &same), "each photograph has a pose of its own");
     let few: Vec<&str> = table.lines().take(3).collect();
     said(&few.join("\n"), "only 2 photographs have a pose of the robot");
     said(&table.replace(".png", "-a.png"), "the poses are for 00-a.png, 01-a.png");
+}
+
+#[test]
+fn a_scale_and_a_noise_that_the_photographs_contradict_are_named() {
+    let folder = folder(&board(8, 9), &[]);
+    let at = folder.path();
+    let (_, poses) = simulated(at, false);
+    let kinds = |options: &str| {
+        done(at, &format!("{HAND_EYE} {options}"));
+        let findings = json(&at.join("handeye.json"))["findings"].clone();
+        let kinds =
+            findings.as_array().unwrap().iter().map(|of| of["kind"].as_str().unwrap().to_owned());
+        kinds.collect::<Vec<_>>()
+    };
+    assert!(kinds("").is_empty());
+    assert!(kinds("--robot-noise 0.1deg,0.3mm").is_empty());
+    assert_eq!(kinds("--robot-noise 1deg,0.3mm"), ["robot_noise"]);
+    let mut table = HEADER.to_owned();
+    for (index, pose) in poses.iter().enumerate() {
+        let scaled = Pose { translation: pose.translation * 1.02, ..*pose };
+        table += &line(&format!("{index:02}"), &scaled);
+    }
+    std::fs::write(at.join("poses.csv"), table).unwrap();
+    assert_eq!(kinds(""), ["scale"]);
+    assert!(kinds("--scale").is_empty());
 }

@@ -142,7 +142,23 @@ fn a_check_of_a_rig_finds_a_camera_that_has_moved() {
     let pose = serde_json::json!({ "quantity": "pose", "camera": "right" });
     let named = ["changed", "or"].iter().flat_map(|list| found[list].as_array().unwrap());
     assert!(named.into_iter().any(|one| *one == pose), "{text}");
+    // The images of the two cameras are exchanged.
+    let target = "--target board.json --board-accuracy 0 -o exchanged.json";
+    let of = "--camera left=same/right --camera right=same/left";
+    let text =
+        String::from_utf8(output(at, &format!("check rig.json {of} {target}")).stdout).unwrap();
+    assert!(
+        text.starts_with("changed: ")
+            && text.contains("with the images of left and right exchanged"),
+        "{text}"
+    );
+    assert_eq!(json(&at.join("exchanged.json"))["exchanged"], serde_json::json!(["left", "right"]));
+
     refused(at, "check rig.json same/left --target board.json", &["--camera NAME=PATH"]);
+    let one = "check rig.json --camera left=same/left --target board.json";
+    refused(at, one, &["--camera: no images of right"]);
+    let every = "check rig.json --camera left=same/left --camera right=same/right --every 2 --target board.json";
+    refused(at, every, &["--every: the inputs are detections"]);
     let wrong = "check rig.json --camera up=same/left --target board.json";
     refused(at, wrong, &["no camera is named up", "left, right"]);
 }

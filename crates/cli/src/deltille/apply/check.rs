@@ -20,7 +20,7 @@ use crate::output::{self, Overwrite, log};
 use crate::run::{FAILED, UNDECIDED};
 use crate::values::whole;
 use deltille::calibrate::{
-    Answer, Calibration, CameraEstimate, CameraViews, Check, Estimate, Intrinsics, Model,
+    Answer, Calibration, CameraEstimate, CameraViews, Check, Estimate, Intrinsics, Missing, Model,
     QuantityTest, Reference, Suspect,
 };
 use deltille::export::kind::Kind;
@@ -110,6 +110,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.board_accuracy.is_some() {
         calibration = calibration.board_accuracy_mm(args.board_accuracy);
     }
+    if let [missing] = calibration.check(&before).missing.as_slice()
+        && !matches!(missing, Missing::Views { .. })
+    {
+        log!("note: only the image size can be checked: {missing}");
+    }
     let mut seen = args.seen(&before, &reference, &limits)?;
     let mut all = Vec::new();
     for camera in &before.cameras {
@@ -177,10 +182,16 @@ impl Args {
         }
         let (recording, camera) = (photographs.first().cloned(), cameras.clone());
         let of_rig = CamerasArgs { recording, camera, topic: topic.clone(), every, views };
-        let sources = of_rig.sources(true)?;
         let names: Vec<&str> = before.cameras.iter().map(|camera| camera.name.as_str()).collect();
+        let sources = of_rig.sources(&names, true)?;
         let option = if cameras.is_empty() { "--topic" } else { "--camera" };
         check_named(option, sources.iter().map(|source| source.name.as_str()), &names)?;
+        if let Some(missing) = names.iter().find(|name| !sources.iter().any(|of| of.name == **name))
+        {
+            bail!(
+                "{option}: no images of {missing}; a rig is checked with those of all its cameras"
+            );
+        }
         let of = |source: &Source| {
             let camera = before.cameras.iter().find(|camera| camera.name == source.name);
             camera.map_or(Intrinsics::Unknown(Model::Radtan), of_model)
@@ -227,7 +238,8 @@ impl Args {
             (true, [recording]) if is_bag(recording) => {}
             (true, _) => ensure!(
                 names.len() == 1,
-                "CAMERA: {} is a rig; give the images of each camera with --camera NAME=PATH (cameras: {})",
+                "CAMERA: {} is a rig; give an MCAP file or a bag with --topic for each camera, or the images of each camera with \
+                 --camera NAME=PATH (cameras: {})",
                 path.display(),
                 names.join(", ")
             ),
@@ -268,6 +280,13 @@ fn describe(found: &Check) -> String {
         },
         _ => found.missing.iter().map(|why| format!("cannot tell: {why}\n")).collect(),
     };
+    if let Some([a, b]) = &found.exchanged {
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "exchanged: with the images of {a} and {b} exchanged, the rig agrees with them"
+        );
+    }
     for test in &found.tests {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{}", describe_test(test));

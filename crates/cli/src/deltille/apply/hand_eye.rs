@@ -11,7 +11,7 @@ use crate::deltille::files::camera_file;
 use crate::interrupt;
 use crate::output::{self, Overwrite, log};
 use deltille::calibrate::{
-    CameraEstimate, HandEye, HandEyeRequest, Intrinsics, Model, Mounting, RobotNoise,
+    CameraEstimate, Contradiction, HandEye, HandEyeRequest, Intrinsics, Model, Mounting, RobotNoise,
 };
 use deltille::camera::Pose;
 use deltille::export::kind::Kind;
@@ -62,10 +62,10 @@ fn noise(text: &str) -> Result<RobotNoise, String> {
     let angle = angle.trim().strip_suffix("deg").and_then(|angle| angle.trim().parse::<f64>().ok());
     let rotation_rad = angle.ok_or_else(wrong)?.to_radians();
     let translation_mm = parse_length_mm(length.trim()).map_err(|error| error.to_string())?;
-    let is_valid = |sd: f64| sd.is_finite() && sd > 0.0;
-    match is_valid(rotation_rad) && is_valid(translation_mm) {
-        true => Ok(RobotNoise { rotation_rad, translation_mm }),
-        false => Err("both must be above 0".to_owned()),
+    let noise = RobotNoise { rotation_rad, translation_mm };
+    match noise.is_valid() {
+        true => Ok(noise),
+        false => Err("expected 0.0001deg to 57deg, and 0.001mm to 1000mm".to_owned()),
     }
 }
 
@@ -135,6 +135,15 @@ fn known(path: &Path) -> anyhow::Result<(CameraEstimate, Vec<TargetIdentity>)> {
 }
 
 fn print_warnings(found: &HandEye) {
+    for contradiction in &found.contradictions {
+        log!(
+            "warning: {contradiction} ({})",
+            match contradiction {
+                Contradiction::Scale { .. } => "--scale",
+                _ => "--robot-noise",
+            }
+        );
+    }
     for view in found.wrong() {
         log!(
             "warning: {}: the robot's pose is {:.2}° and {:.2} mm off; not used",

@@ -84,7 +84,26 @@ fn is_detection(path: &Path) -> bool {
     content.map_or(true, |content| Kind::of(&content) == Kind::of_schema(detection::SCHEMA))
 }
 
+/// Rejects options that were given, and do not apply to detections.
+pub fn check_none(given: [(&str, bool); 3]) -> anyhow::Result<()> {
+    match given.iter().find(|(_, is_given)| *is_given) {
+        Some((option, _)) => {
+            bail!(
+                "{option}: the inputs are detections; omit {option}, or give their photographs or recordings"
+            )
+        }
+        None => Ok(()),
+    }
+}
+
 impl FilmArgs {
+    /// Rejects the options, for detections.
+    pub fn check_none(&self) -> anyhow::Result<()> {
+        let RecordingArgs { topic, every } = &self.recording;
+        let views = self.views.is_some();
+        check_none([("--topic", topic.is_some()), ("--every", *every > 1), ("--views", views)])
+    }
+
     /// Detects the target in all frames of a camera, and returns those to use.
     pub fn see(
         &self,

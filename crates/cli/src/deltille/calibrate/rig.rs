@@ -79,7 +79,7 @@ pub struct Args {
 
 /// Calibrates a rig and writes it.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let sources = args.cameras.sources(args.refine_target)?;
+    let sources = args.cameras.sources(&[], args.refine_target)?;
     let names: Vec<&str> = sources.iter().map(|source| source.name.as_str()).collect();
     for (option, given) in [("--known", &args.known), ("--images", &args.images)] {
         check_named(option, given.iter().map(|(name, _)| name.as_str()), &names)?;

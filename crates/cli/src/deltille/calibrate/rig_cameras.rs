@@ -70,10 +70,11 @@ pub fn topic(text: &str) -> Result<(Option<String>, String), String> {
 }
 
 impl CamerasArgs {
-    /// Returns the cameras. A rig has several, unless it is used to measure a target.
-    pub fn sources(&self, is_one_enough: bool) -> anyhow::Result<Vec<Source>> {
+    /// Returns the cameras. A rig has several, unless it is used to measure a target. Of a calibrated rig, `known` are the names
+    /// of its cameras; otherwise it is empty.
+    pub fn sources(&self, known: &[&str], is_one_enough: bool) -> anyhow::Result<Vec<Source>> {
         let sources = match &self.recording {
-            Some(recording) => self.in_one(recording)?,
+            Some(recording) => self.in_one(recording, known)?,
             None => self.in_several()?,
         };
         if sources.len() < 2 && !is_one_enough {
@@ -83,13 +84,12 @@ impl CamerasArgs {
             );
         }
         check_places(&sources)?;
-        let names: Vec<&str> = sources.iter().map(|source| source.name.as_str()).collect();
-        check_names(&names)?;
+        check_names(&sources)?;
         Ok(sources)
     }
 
     /// The cameras of one recording.
-    fn in_one(&self, recording: &Path) -> anyhow::Result<Vec<Source>> {
+    fn in_one(&self, recording: &Path, known: &[&str]) -> anyhow::Result<Vec<Source>> {
         if self.topic.is_empty() {
             let show = recording.display();
             return match Frames::open(recording, &FrameOptions::default()) {
@@ -105,11 +105,10 @@ impl CamerasArgs {
         let topics: Vec<&str> = self.topic.iter().map(|(_, topic)| topic.as_str()).collect();
         let names = differing(&topics);
         let source = |((name, topic), differing): (&(Option<String>, String), String)| {
-            let name =
-                name.clone().map_or_else(|| Name::new(&differing).map(|name| name.to_string()), Ok);
-            let name = name.map_err(|why| {
-                anyhow!("--topic {topic}: {why}; name the camera with --topic NAME={topic}")
-            })?;
+            let name = match name {
+                Some(name) => name.clone(),
+                None => named_by_topic(topic, &differing, known)?,
+            };
             let (path, option) = (recording.to_owned(), format!("--topic {topic}"));
             Ok(Source { name, option, path, topic: Some(topic.clone()) })
         };
@@ -155,6 +154,12 @@ impl CamerasArgs {
     ) -> anyhow::Result<Vec<Given>> {
         let paths: Vec<PathBuf> = sources.iter().map(|source| source.path.clone()).collect();
         if !filming::are_images(&paths)? {
+            let (topic, views) = (!self.topic.is_empty(), self.views.is_some());
+            filming::check_none([
+                ("--topic", topic),
+                ("--every", self.every > 1),
+                ("--views", views),
+            ])?;
             let given = sources.iter().map(|source| {
                 let given = sightings::given(std::slice::from_ref(&source.path), limits);
                 given.with_context(|| source.option.clone())
@@ -230,18 +235,41 @@ fn differing(topics: &[&str]) -> Vec<String> {
     all.iter().map(rest).collect()
 }
 
+/// Names the camera of a topic: one of the `known` cameras that is a part of the topic, or without known cameras, the part that
+/// differs from other topics.
+fn named_by_topic(topic: &str, differing: &str, known: &[&str]) -> anyhow::Result<String> {
+    if known.is_empty() || known.contains(&differing) {
+        let name = Name::new(differing).map_err(|why| {
+            anyhow!("--topic {topic}: {why}; name the camera with --topic NAME={topic}")
+        })?;
+        return Ok(name.to_string());
+    }
+    let named: Vec<&&str> =
+        known.iter().filter(|camera| topic.split('/').any(|part| part == **camera)).collect();
+    match named.as_slice() {
+        [camera] => Ok(camera.to_string()),
+        _ => bail!(
+            "--topic {topic}: its camera is not clear; name the camera with --topic NAME={topic} (cameras: {})",
+            known.join(", ")
+        ),
+    }
+}
+
 /// Rejects camera names that are not valid or not distinct file names.
-fn check_names(names: &[&str]) -> anyhow::Result<()> {
-    for (index, name) in names.iter().enumerate() {
-        let is_same = |other: &&&str| other.to_lowercase() == name.to_lowercase();
-        let is_taken = ["rig", "camchain"].iter().any(|own| is_same(&own));
+fn check_names(sources: &[Source]) -> anyhow::Result<()> {
+    for (index, Source { name, option, .. }) in sources.iter().enumerate() {
+        let is_same = |other: &str| other.to_lowercase() == name.to_lowercase();
+        let is_taken = ["rig", "camchain"].iter().any(|own| is_same(own));
         if is_taken || name.contains(['/', '\\']) || name.starts_with('.') {
-            bail!("--camera: {name} is not a valid file name");
+            bail!("{option}: {name} is not a valid file name");
         }
-        match names[..index].iter().find(is_same) {
-            Some(other) if other == name => bail!("--camera: {name} is given twice"),
-            Some(other) => bail!(
-                "--camera: {other} and {name} differ only in case, so their files would collide on some systems"
+        match sources[..index].iter().find(|other| is_same(&other.name)) {
+            Some(other) if other.option == *option => bail!("{option}: given twice"),
+            Some(other) if other.name == *name => {
+                bail!("{option}: this is {name}, like {}; name one of them", other.option)
+            }
+            Some(Source { name: other, .. }) => bail!(
+                "{option}: {other} and {name} differ only in case, so their files would collide on some systems"
             ),
             None => {}
         }

@@ -306,7 +306,10 @@ pub fn seen(
 ) -> anyhow::Result<Read> {
     let given = match filming::are_images(paths)? {
         true => film.see(paths, reference, intrinsics, limits)?,
-        false => given(paths, limits)?,
+        false => {
+            film.check_none()?;
+            given(paths, limits)?
+        }
     };
     views_of(given, reference, is_assumed)
 }

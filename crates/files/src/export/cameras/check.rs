@@ -22,6 +22,8 @@ struct CheckFile<'a> {
     rms_px: f64,
     camera_size_px: [u32; 2],
     size_px: [u32; 2],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    exchanged: Option<&'a [String; 2]>,
 }
 
 /// A quantity, of a camera if there are several.
@@ -78,6 +80,7 @@ pub fn write(found: &Check) -> String {
         rms_px: found.rms_px,
         camera_size_px,
         size_px,
+        exchanged: found.exchanged.as_ref(),
     };
     json::to_text(&file, 3)
 }

@@ -26,6 +26,7 @@ struct HandEyeFile<'a> {
     scale: f64,
     scale_sd: Option<f64>,
     robot_noise: Noise,
+    findings: Vec<Finding>,
     rotations: Vec<Spread>,
     paired_by: &'static str,
     rms_px: f64,
@@ -58,6 +59,13 @@ struct Noise {
     translation_mm: f64,
     /// `null` if the noise was given.
     degrees_of_freedom: Option<[f64; 2]>,
+}
+
+/// A contradiction.
+#[derive(Serialize)]
+struct Finding {
+    kind: &'static str,
+    text: String,
 }
 
 #[derive(Serialize)]
@@ -116,6 +124,11 @@ pub fn write(found: &HandEye) -> String {
             translation_mm: found.noise.translation_mm,
             degrees_of_freedom: found.noise_freedom,
         },
+        findings: found
+            .contradictions
+            .iter()
+            .map(|of| Finding { kind: of.name(), text: of.to_string() })
+            .collect(),
         rotations: found
             .rotation_spread
             .iter()
