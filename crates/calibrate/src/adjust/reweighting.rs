@@ -4,15 +4,16 @@
 //! Robust losses are M-estimators. Gross outliers, beyond a gap in the distribution of residuals,
 //! are excluded. Smooth residuals, which an unsuitable lens model leaves, are not.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec2;
 
 use crate::equations::factor::Factor;
-use crate::equations::minimise::{Minimum, Until, minimise_with};
+use crate::equations::minimise::{Minimum, Until, minimise, minimise_with};
 use crate::error::CalibrationError;
 use crate::input::loss::Loss;
 use crate::input::observation::{MIN_CORNERS, Observation};
+use crate::input::panel::PanelRef;
 use crate::input::weights::Weights;
 use crate::problem::bundle::Problem;
 use crate::problem::unknowns::Block;
@@ -44,6 +45,12 @@ const IN_THE_GAP: f64 = 0.25;
 const SMOOTH: f64 = 0.5;
 const FALLS_OFF: f64 = 0.05;
 const MIN_SMOOTH_SIGMA: f64 = 3.0;
+
+/// A gross outlier of a measured target is used if its residual then falls below this fraction of
+/// its value: it determines more of the estimate at its place than all other corners together, for
+/// example the lens in a part of the image that only this corner reaches. A wrong position of a
+/// corner in fewer than half of its views stays above it.
+const SELF_DETERMINED: f64 = 0.5;
 
 /// The parts of a problem that agree with each other.
 #[derive(Clone, Debug)]
@@ -125,12 +132,69 @@ pub(crate) fn settle(
             break;
         }
     }
+    // Offsets of corners absorb the smooth residuals of a wrong lens, except at its rim. Corners that
+    // determine the estimate alone count in full: a robust loss would reduce their weight until the
+    // estimate fits the other corners only.
+    let (mut loss, without) = (loss, deviations(&all, &whitening));
+    let mut wrong = wrong_corners(&all, &gross);
+    let mut tried =
+        marked(&all, |block, corner, label| gross[block][corner] && wrong.contains(&label));
+    while all.map.is_some() && gross.iter().flatten().any(|gross| *gross) {
+        let used = counting(&all, &tried);
+        let weights = whitening.of(&used);
+        let Some(with) = minimise(used, &weights, Loss::Squared, Until::Rough) else { break };
+        let with = all.at(&with.problem);
+        let (off, limit) = (deviations(&with, &whitening), whitening.outlier_limit());
+        // The wrong observations of a corner displace it from the others.
+        wrong.extend(wrong_corners(
+            &all,
+            &marked(&all, |block, corner, _| off[block][corner] > limit),
+        ));
+        let contradicted = marked(&all, |block, corner, label| {
+            let is_far = off[block][corner] > SELF_DETERMINED * without[block][corner];
+            gross[block][corner] && (is_far || wrong.contains(&label))
+        });
+        if contradicted == gross {
+            break;
+        }
+        (all, loss) = (with, Loss::Squared);
+        (tried, gross) = (contradicted.clone(), contradicted);
+        part = counting(&all, &gross);
+    }
+    if loss == Loss::Squared {
+        whitening = Whitening::fit(&part, weights, &residuals(&part));
+    }
     let minimum = minimise_with(factor, part, &whitening, loss, Until::Fine).ok_or_else(start)?;
     let problem = all.at(&minimum.problem);
     let limit = whitening.outlier_limit();
     let of_block = |off: Vec<f64>| off.into_iter().map(|off| off > limit).collect();
     let outliers = deviations(&problem, &whitening).into_iter().map(of_block).collect();
     Ok(Settled { minimum, whitening, problem, outliers })
+}
+
+/// A corner of a target: its panel, row and column.
+type Label = (PanelRef, i32, i32);
+
+/// Marks the observations for which `is` returns true: of the block, the index in it, and the corner.
+fn marked(problem: &Problem, is: impl Fn(usize, usize, Label) -> bool) -> Vec<Vec<bool>> {
+    let of_block = |(block, of): (usize, &Block)| {
+        let corners = of.observations.iter().enumerate();
+        corners.map(|(corner, seen)| is(block, corner, (of.panel, seen.row, seen.col))).collect()
+    };
+    problem.blocks.iter().enumerate().map(of_block).collect()
+}
+
+/// The corners of which at least half of the observations are `far` off: their positions are wrong, or differ between views.
+fn wrong_corners(problem: &Problem, far: &[Vec<bool>]) -> BTreeSet<Label> {
+    let mut counts: BTreeMap<Label, [usize; 2]> = BTreeMap::new();
+    for (block, far) in problem.blocks.iter().zip(far) {
+        for (seen, &far) in block.observations.iter().zip(far) {
+            let [outliers, views] = counts.entry((block.panel, seen.row, seen.col)).or_default();
+            (*outliers, *views) = (*outliers + usize::from(far), *views + 1);
+        }
+    }
+    let wrong = counts.into_iter().filter(|(_, [outliers, views])| 2 * outliers >= *views);
+    wrong.map(|(label, _)| label).collect()
 }
 
 /// Marks the gross outliers of each block. Every frame keeps at least the corners with the smallest

@@ -98,7 +98,8 @@ impl Links {
         let RobotNoise { rotation_rad, translation_mm } = now.noise;
         let [turn, step] = [rotation_rad, translation_mm].map(|sd| sd * sd);
         let own = Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, step, step, step));
-        let freedom = now.freedom[0] + now.freedom[1];
+        // Of one component: its uncertainty determines the tail of the squared length.
+        let freedom = 3.0 * self.used().count() as f64 - 6.0;
         let is_right = |(link, used): (&Option<Residual>, &bool)| {
             let Some((off, covariance)) = link else { return false };
             // The prediction of a used link includes the link. Robust weights of corners may make its covariance too large.
@@ -122,7 +123,7 @@ impl Components {
     pub(super) fn explain(&self, [turn, step]: [f64; 2]) -> bool {
         let RobotNoise { rotation_rad, translation_mm } = self.noise;
         let squared = (turn / rotation_rad).powi(2) + (step / translation_mm).powi(2);
-        is_plausible(squared, self.freedom[0] + self.freedom[1])
+        is_plausible(squared, self.freedom[0])
     }
 }
 
