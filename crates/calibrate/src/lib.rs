@@ -15,6 +15,7 @@
 //!
 //! 9. `check` tests whether a calibrated camera still agrees with a few new views.
 //! 10. `hand_eye` locates a camera and a board on a robot.
+//! 11. `timing` estimates rolling shutters and the clocks of a rig from a moving target.
 //!
 //! `adjusted` runs 4 to 7 on all views. `solve` wraps it and holds out frames; `automatic` selects
 //! a model with `solve`; `located` computes the pose of a target. `compare` and `next_view` read
@@ -57,6 +58,7 @@ mod problem;
 mod selection;
 mod solve;
 mod start;
+mod timing;
 mod uncertainty;
 
 pub use adjust::finding::{Finding, Moved, OutlierPattern};
@@ -107,4 +109,6 @@ pub use next_view::holding::{HoldStatus, HoldTracker};
 pub use problem::shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};
 pub use selection::keyframes::{Keyframe, Keyframes};
 pub use start::symmetry::LabelRotation;
+pub use timing::run::timing;
+pub use timing::values::{CameraTiming, Measured, TimedCamera, Timing, TimingError};
 pub use uncertainty::projection::{ObservedCovariance, ProjectionUncertainty, Source};

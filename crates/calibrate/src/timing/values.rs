@@ -1,0 +1,93 @@
+//! Views with time stamps, and the timing of cameras as values.
+
+use crate::input::observation::View;
+use deltille_core::camera::{Camera, Pose};
+
+/// A calibrated camera and its views.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimedCamera {
+    /// Name of the camera.
+    pub name: String,
+    /// The camera.
+    pub camera: Camera,
+    /// Its pose on the rig; the identity for a single camera.
+    pub camera_from_rig: Pose,
+    /// Time stamps, ns, and views, in any order.
+    pub views: Vec<(i64, View)>,
+}
+
+/// The timing of the cameras of a rig, or of one camera.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Timing {
+    /// The cameras, in the given order.
+    pub cameras: Vec<CameraTiming>,
+    /// Number of frames of the first camera with a smooth motion of the target.
+    pub frames: usize,
+    /// Median interval between the frames of the first camera, s.
+    pub interval_s: f64,
+    /// Median speed of the corners in the images of the first camera, px/s.
+    pub speed_px_s: f64,
+    /// RMS residual per axis, px.
+    pub rms_px: f64,
+}
+
+/// The timing of one camera.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct CameraTiming {
+    /// Name of the camera.
+    pub name: String,
+    /// Time from the exposure of the first row to that of the last, s; positive if the upper rows are exposed first. `None` if
+    /// the motion does not determine it.
+    pub readout_s: Option<Measured>,
+    /// Height of the image, px: the line delay is the readout divided by it.
+    pub height: u32,
+    /// Largest displacement of a corner by the readout, between the first and the last row, px.
+    pub shear_px: f64,
+    /// Time of its middle row minus that of the first camera, for equal time stamps, s, in the middle of the recording.
+    /// `None` for the first camera, or if it is undetermined.
+    pub offset_s: Option<Measured>,
+    /// Change of the offset with time, s/s. `None` for the first camera, or if it is undetermined.
+    pub drift: Option<Measured>,
+    /// Number of its frames that were used.
+    pub frames: usize,
+}
+
+/// An estimated value and its standard deviation, observed in the scatter between frames.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    /// The value.
+    pub value: f64,
+    /// Its standard deviation.
+    pub sd: f64,
+}
+
+/// The normal quantile of a probability of 0.1 % on both sides.
+const SIGNIFICANT: f64 = 3.29;
+
+impl Measured {
+    /// Whether it differs from zero with a probability of error of 0.1 %.
+    pub fn is_significant(&self) -> bool {
+        self.value.abs() > SIGNIFICANT * self.sd
+    }
+}
+
+/// Why the timing cannot be estimated.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TimingError {
+    /// Too few successive frames show the target.
+    #[error(
+        "only {frames} frames of {camera} have neighbours that show the target; at least {needed} are needed: keep the target in \
+         view and move it smoothly, and give all frames"
+    )]
+    TooFew {
+        /// Name of the camera.
+        camera: String,
+        /// Number of these frames.
+        frames: usize,
+        /// The minimum.
+        needed: usize,
+    },
+}
