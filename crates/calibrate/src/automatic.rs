@@ -7,9 +7,11 @@
 
 use std::collections::BTreeMap;
 
-use super::error::CalibrationError;
+use super::error::{CalibrationError, ConstraintError};
 use super::estimate::values::{CameraEstimate, Estimate, ViewEstimate};
 use super::input::calibration::{Calibration, CameraViews};
+use super::input::constraint::Constraint;
+use super::input::intrinsics::Intrinsics;
 use super::input::observation::View;
 use super::input::sample::evenly;
 use super::model::Model;
@@ -72,7 +74,7 @@ struct Tried {
 
 impl Calibration {
     /// Selects one of these models for a camera, and returns the compared candidates. A model that was given for the camera is
-    /// ignored.
+    /// ignored. Models without a [constrained](Self::set_constraints) parameter are not tried.
     ///
     /// # Errors
     /// Returns an error if there are too few views to hold some out, or if no model explains them.
@@ -90,7 +92,11 @@ impl Calibration {
             let is_spline = matches!(model, Model::Spline { .. });
             !is_spline || of_fit >= COORDINATES_A_PARAMETER * parameters(*model)
         };
-        let models: Vec<Model> = among.iter().copied().filter(is_enough).collect();
+        let has_all = |model: &Model| self.check_constraints(camera, *model).is_ok();
+        if let (Some(&first), false) = (among.first(), among.iter().any(has_all)) {
+            self.check_constraints(camera, first)?;
+        }
+        let models: Vec<Model> = among.iter().copied().filter(has_all).filter(is_enough).collect();
         let candidates = self.tried(camera, &models, MAX_VIEWS)?;
         let chosen = candidates.iter().find(|candidate| candidate.chosen);
         let model = chosen.map(|chosen| chosen.model).ok_or(CalibrationError::NoStart)?;
@@ -104,9 +110,17 @@ impl Calibration {
     /// Returns an error if there are too few views to hold some out, or if no model explains them.
     pub fn compare_models(&self, camera: usize) -> Result<Vec<Candidate>, CalibrationError> {
         match self.cameras[camera].intrinsics.model() {
-            Some(model) => self.tried(camera, &model.neighbours(), VIEWS_TO_COMPARE),
+            Some(model) => {
+                let mut models = model.neighbours();
+                models.retain(|model| self.check_constraints(camera, *model).is_ok());
+                self.tried(camera, &models, VIEWS_TO_COMPARE)
+            }
             None => Ok(Vec::new()),
         }
+    }
+
+    fn check_constraints(&self, camera: usize, model: Model) -> Result<(), ConstraintError> {
+        Constraint::check(&self.cameras[camera].constraints, &Intrinsics::Unknown(model))
     }
 
     fn tried(
@@ -118,7 +132,8 @@ impl Calibration {
         let views: Vec<View> = evenly(&self.cameras[camera].views, most_views).cloned().collect();
         let alone = self.alone(camera, &self.panels);
         let of_model = |model: Model| {
-            let only = CameraViews::new("", views.clone(), model);
+            let constraints = self.cameras[camera].constraints.clone();
+            let only = CameraViews { constraints, ..CameraViews::new("", views.clone(), model) };
             let calibration = alone.of_cameras(vec![only]).hold_out(Some(HELD_OUT));
             calibration.board_shape(false).measure_target(false).solve()
         };
@@ -152,11 +167,7 @@ impl Tried {
         };
         Some(Self {
             squares: views.map(|view| (view.name.clone(), of_view(view))).collect(),
-            parameters: found
-                .cameras
-                .iter()
-                .map(|camera| camera.estimated_parameters().count())
-                .sum(),
+            parameters: found.cameras.iter().map(CameraEstimate::unknown_count).sum(),
             is_stable: found.cameras.iter().all(|camera| camera.ill_conditioned.is_empty()),
             camera: found.cameras.first()?.clone(),
         })

@@ -28,6 +28,55 @@ impl fmt::Display for DegenerateMotion {
     }
 }
 
+/// Why a constraint is unusable.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConstraintError {
+    /// A text that is not a constraint.
+    #[error("`{text}` must be {expected}")]
+    Syntax {
+        /// The text.
+        text: String,
+        /// The expected form, with an example.
+        expected: &'static str,
+    },
+    /// A parameter that the model does not estimate.
+    #[error("{model} has no parameter {parameter} to estimate; it has {known}")]
+    Unknown {
+        /// The name that was given.
+        parameter: String,
+        /// The model.
+        model: String,
+        /// The parameters of the model, separated by commas.
+        known: String,
+    },
+    /// A parameter fixed without a value that has no default value.
+    #[error("{parameter} has no default value; give one, such as {parameter}=1.5")]
+    NoDefault {
+        /// Name of the parameter.
+        parameter: String,
+    },
+    /// A parameter with two constraints that exclude each other.
+    #[error(
+        "{parameter} has two constraints; it may be fixed, equal to others, or have a prior (one prior is \
+         allowed for equal parameters)"
+    )]
+    Twice {
+        /// Name of the parameter.
+        parameter: String,
+    },
+    /// A value outside its range.
+    #[error("{what} of {parameter} must be a positive finite number, not {value}")]
+    OutOfRange {
+        /// Name of the parameter.
+        parameter: String,
+        /// The quantity: the value of a focal length, or a standard deviation.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+}
+
 /// Why a calibration failed. Each message says what to do about it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -204,6 +253,9 @@ pub enum CalibrationError {
         /// Number of panels.
         panels: usize,
     },
+    /// A constraint on a parameter that is unusable.
+    #[error("{0}")]
+    Constraint(#[from] ConstraintError),
     /// No focal length fits the views.
     #[error(
         "no camera fits the views: most corners are mislabelled, or the target is not the one that was \

@@ -83,6 +83,7 @@ impl Calibration {
                 name: camera.name.clone(),
                 views,
                 intrinsics: found.camera.clone().into(),
+                constraints: Vec::new(),
                 camera_from_rig: Some(found.camera_from_rig),
             }
         });

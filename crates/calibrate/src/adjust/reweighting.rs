@@ -296,8 +296,11 @@ pub(crate) fn variance(minimum: &Minimum, whitening: &Whitening, loss: Loss) -> 
     // Priors on corner offsets add as many observations as there are unknowns.
     let expected = problem.cameras.iter().filter_map(|camera| camera.roughness.as_ref());
     // The prior on second differences of knots adds as many as its rank.
+    // Each parameter with a prior was observed once more.
+    let measured = problem.cameras.iter().filter_map(|camera| camera.prior.as_ref());
     let unknowns = layout.shared + 6 * problem.frames.len()
-        - expected.map(|roughness| roughness.rank()).sum::<usize>();
+        - expected.map(|roughness| roughness.rank()).sum::<usize>()
+        - measured.map(|prior| prior.count()).sum::<usize>();
     let freedom = (2 * problem.count()).saturating_sub(unknowns).max(1) as f64;
     if loss == Loss::Squared {
         return normal.cost / freedom;

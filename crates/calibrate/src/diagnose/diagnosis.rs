@@ -10,6 +10,7 @@ use crate::estimate::lens_limit::LensLimit;
 use crate::estimate::values::{CameraEstimate, Estimate};
 use crate::excluded::Excluded;
 use crate::input::calibration::Calibration;
+use crate::input::constraint::Constraint;
 use crate::input::order::in_order;
 use crate::input::panel::PanelRef;
 use crate::model::Model;
@@ -23,6 +24,9 @@ const POOR_RMS_PX: f64 = 1.0;
 
 /// Fraction of the views that a calibration may exclude.
 const MAX_EXCLUDED: f64 = 0.2;
+
+/// Deviation of a prior from the views, in standard deviations, that is not due to chance.
+const WRONG_PRIOR_SIGMA: f64 = 4.0;
 
 /// Minimum difference between the focal lengths of two minima, in standard deviations.
 const APART_SIGMA: f64 = 10.0;
@@ -139,6 +143,15 @@ pub enum Diagnosis {
         camera: usize,
         /// RMS residual per axis without outliers, px.
         rms_px: f64,
+    },
+    /// A prior of a parameter that the views contradict.
+    WrongPrior {
+        /// The camera.
+        camera: usize,
+        /// Name of the parameter.
+        parameter: String,
+        /// Difference between the prior and the value from the views alone, in standard deviations of this difference.
+        deviations: f64,
     },
     /// Parameters that the views do not distinguish.
     IllConditioned {
@@ -345,7 +358,34 @@ fn said(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
     };
     let gross = gross.filter(|said| !is_of_lens(said));
     let before = failures.into_iter().chain(late).chain(states);
-    before.chain(ends).chain(gross).chain(causes).chain(open).collect()
+    let priors = cameras().flat_map(|(camera, of)| wrong_priors(camera, of));
+    before.chain(ends).chain(gross).chain(causes).chain(priors).chain(open).collect()
+}
+
+/// The priors of a camera that its views contradict.
+///
+/// With the prior m ± d, the value x from the views alone and the estimate, x − m is (estimate − m) / (1 − k), where
+/// k = (σ / d)² is the weight of the prior; its variance is d² + σₓ².
+fn wrong_priors(camera: usize, of: &CameraEstimate) -> Vec<Diagnosis> {
+    let found = of.parameters.iter().zip(of.observed_sd());
+    let wrong = found.filter_map(|(found, observed)| {
+        let (value, sd) = of.constraints.iter().find_map(|one| match one {
+            Constraint::Prior { parameter, value, sd } if *parameter == found.name => {
+                Some((*value, *sd))
+            }
+            _ => None,
+        })?;
+        let noise = found.sd?;
+        let observed = observed.unwrap_or(noise).max(noise);
+        let variance = sd * sd - 2.0 * noise * noise + observed * observed;
+        let deviations = (found.value - value).abs() / variance.max(f64::MIN_POSITIVE).sqrt();
+        (deviations > WRONG_PRIOR_SIGMA).then(|| Diagnosis::WrongPrior {
+            camera,
+            parameter: found.name.clone(),
+            deviations,
+        })
+    });
+    wrong.collect()
 }
 
 /// The diagnoses of changed cameras, rolling shutters and stretched boards.

@@ -85,6 +85,13 @@ impl<'a> Messages<'a> {
                     other_lens(self.model(*camera))
                 ),
             ),
+            Diagnosis::WrongPrior { camera, parameter, deviations } => self.of_camera(
+                *camera,
+                format!(
+                    "the prior of {parameter} differs from its value in the views by {deviations:.1} standard \
+                     deviations: the measurement or its standard deviation is wrong, or the lens does not fit its model"
+                ),
+            ),
             Diagnosis::IllConditioned { camera, parameters, sufficient } => {
                 self.of_camera(*camera, ill_conditioned(parameters, *sufficient))
             }

@@ -8,7 +8,8 @@ use std::collections::BTreeSet;
 
 use crate::adjust::lack_of_fit::{MATTERS, SIGNIFICANT, deviate_of_f};
 use crate::estimate::values::{CameraEstimate, Estimate, ViewEstimate};
-use crate::input::calibration::{Calibration, CameraViews, Intrinsics};
+use crate::input::calibration::{Calibration, CameraViews};
+use crate::input::intrinsics::Intrinsics;
 use crate::input::observation::View;
 use crate::input::panel::PanelPrior;
 use crate::input::sample::evenly;
@@ -323,8 +324,7 @@ fn fits_as_well(smaller: &Estimate, found: &Estimate) -> bool {
             count += 2.0;
         }
     }
-    let parameters =
-        |estimate: &Estimate| estimate.cameras[0].estimated_parameters().count() as f64;
+    let parameters = |estimate: &Estimate| estimate.cameras[0].unknown_count() as f64;
     let less = parameters(found) - parameters(smaller);
     let freedom = count - parameters(found) - 6.0 * found.frames.len() as f64;
     let f_ratio = (other - own).max(0.0) / less / (own / freedom);

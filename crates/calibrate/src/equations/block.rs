@@ -189,6 +189,13 @@ impl<'a> Chain<'a> {
     }
 }
 
+/// The first column of the unknown parameters of a camera, and the number of their columns.
+fn columns_of(parameters: &[(usize, usize)]) -> (usize, usize) {
+    let columns = || parameters.iter().map(|&(_, column)| column);
+    let first = columns().min().unwrap_or(0);
+    (first, columns().max().map_or(0, |last| last + 1 - first))
+}
+
 impl Local {
     pub(crate) fn of(
         problem: &Problem,
@@ -210,9 +217,10 @@ impl Local {
             _ => None,
         };
         let poses = chain.columns();
+        let (first, own) = columns_of(free);
         let columns: Vec<usize> = match &support {
             Some(support) => support.touched.iter().copied().chain(poses).collect(),
-            None => free.iter().map(|&(_, column)| column).chain(poses).collect(),
+            None => (first..first + own).chain(poses).collect(),
         };
         let n = columns.len() + 6;
         let mut sums = Sums::of(n);
@@ -237,18 +245,18 @@ impl Local {
             }
             for (i, row) in rows.iter_mut().enumerate() {
                 let mut next = 0;
+                if support.is_none() {
+                    row[..own].fill(0.0);
+                    for &(parameter, column) in free {
+                        row[column - first] += at.by_parameters[parameter][i];
+                    }
+                    next = own;
+                }
                 let mut push = |value: f64| {
                     row[next] = value;
                     next += 1;
                 };
-                match &support {
-                    Some(support) => support.derivatives(&at, i, &mut push),
-                    None => {
-                        for &(parameter, _) in free {
-                            push(at.by_parameters[parameter][i]);
-                        }
-                    }
-                }
+                support.iter().for_each(|support| support.derivatives(&at, i, &mut push));
                 chain.derivatives(place, by_place[i], bends.as_ref(), &mut push);
             }
             let residual = seen.pixel - at.pixel;

@@ -8,7 +8,8 @@ use crate::problem::shape;
 /// The columns of the kept unknowns.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Layout {
-    /// For each camera, the unknown parameters and their columns.
+    /// For each camera, the unknown parameters in ascending order, and their columns, which are contiguous. Equal
+    /// parameters share a column.
     pub parameters: Vec<Vec<(usize, usize)>>,
     /// First of the six columns of a camera's pose.
     pub cameras: Vec<Option<usize>>,
@@ -40,8 +41,12 @@ impl Layout {
         let mut parameters = Vec::new();
         let mut cameras = Vec::new();
         for camera in &problem.cameras {
-            let free = (0..camera.free.len()).filter(|&i| camera.free[i]);
-            parameters.push(free.map(|i| (i, take(1))).collect());
+            let groups = camera.groups().into_iter().map(|group| (group, take(1)));
+            let columns =
+                groups.flat_map(|(group, column)| group.into_iter().map(move |i| (i, column)));
+            let mut columns: Vec<(usize, usize)> = columns.collect();
+            columns.sort_unstable();
+            parameters.push(columns);
             cameras.push(camera.pose_free.then(|| take(6)));
         }
         let panels = problem.panels.iter().map(|p| p.pose_free.then(|| take(6))).collect();

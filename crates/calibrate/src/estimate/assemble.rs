@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, Matrix3};
 
+use super::listed::shared;
 use super::target_map::{CornerOffset, TargetMap};
 use super::values::{
     CameraEstimate, Corner, Estimate, FrameEstimate, Parameter, TargetEstimate, ViewEstimate,
@@ -88,6 +89,7 @@ impl Estimate {
         });
         let cameras: Vec<CameraEstimate> = cameras.collect();
         let joint = joint(&cameras, settled, observed.as_ref());
+        let shared = shared(calibration, layout, &cameras, &covariance, observed.as_ref());
         let panels = problem.panels.iter().zip(&layout.panels).map(|(panel, first)| PanelPrior {
             target_from_panel: panel.target_from_panel,
             covariance: first.map(|first| {
@@ -107,6 +109,7 @@ impl Estimate {
             targets: targets.collect(),
             panels: panels.collect(),
             joint,
+            shared,
             shape: board_shape(minimum, &covariance, f_ratio),
             map: target_map(settled, &found.corners, variance, loss, drawn.as_ref()),
             rms_px: rms_px(cameras.iter().flat_map(CameraEstimate::corners)),
@@ -231,6 +234,7 @@ fn camera_estimate(
         name: given.name.clone(),
         camera: unknowns.camera.clone(),
         model: given.intrinsics.model(),
+        constraints: given.constraints.clone(),
         parameters: values
             .map(|(i, (name, value))| Parameter { name: name.clone(), value, sd: sd_of(i) })
             .collect(),
@@ -269,7 +273,8 @@ fn projection(
     let observed = observed.map(|observed| {
         let columns: Vec<usize> = columns.iter().map(|(_, column)| *column).collect();
         let mut own = observed_of(observed, &columns);
-        if let Some(state) = state {
+        // The halves of the views do not know what a prior knows.
+        if let (Some(state), None) = (state, &problem.cameras[index].prior) {
             let noise = camera.covariance.inner();
             let raised =
                 split_halves::raised(state, &camera.camera, own.covariance.into_inner(), noise);

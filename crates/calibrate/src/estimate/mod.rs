@@ -8,7 +8,8 @@
 //! 3. `uncertainty_map` is the projection uncertainty of a camera over its image, and `depth` that of distances that two
 //!    cameras measure.
 //! 4. `assemble` builds the estimate.
-//! 5. `corner_check` finds the corners of a measured target that their observations contradict.
+//! 5. `shared` is the covariance of all unknowns that the frames share; `listed` names them.
+//! 6. `corner_check` finds the corners of a measured target that their observations contradict.
 
 pub(crate) mod assemble;
 pub(crate) mod corner_check;
@@ -16,6 +17,8 @@ pub(crate) mod coverage;
 pub(crate) mod depth;
 pub(crate) mod image_circle;
 pub(crate) mod lens_limit;
+pub(crate) mod listed;
+pub(crate) mod shared;
 pub(crate) mod target_map;
 pub(crate) mod uncertainty_map;
 pub(crate) mod values;

@@ -7,10 +7,12 @@ use glam::DVec2;
 
 use super::coverage::Coverage;
 use super::lens_limit::LensLimit;
+use super::shared::SharedCovariance;
 use super::target_map::TargetMap;
 use crate::adjust::finding::Finding;
 use crate::adjust::lack_of_fit::LackOfFit;
 use crate::excluded::Excluded;
+use crate::input::constraint::Constraint;
 use crate::input::panel::{PanelPrior, PanelRef};
 use crate::matrix::Matrix;
 use crate::model::Model;
@@ -68,6 +70,8 @@ pub struct Estimate {
     /// [`camera_from_rig`](CameraEstimate::camera_from_rig) about the camera's axes (rad, mm) if it was estimated. `None`
     /// for a single camera, with splines, or with too few frames.
     pub joint: Option<ObservedCovariance>,
+    /// Covariance of all cameras, panels and targets together; `None` if nothing but poses of frames was estimated.
+    pub shared: Option<SharedCovariance>,
     /// Number of iterations of the last bundle adjustment.
     pub steps: usize,
     /// The information about the first camera and the board's shape, on which proposals of views
@@ -87,6 +91,8 @@ pub struct CameraEstimate {
     pub camera: Camera,
     /// The estimated model; `None` if the camera was given.
     pub model: Option<Model>,
+    /// Constraints on its parameters.
+    pub constraints: Vec<Constraint>,
     /// All its parameters, both estimated and fixed.
     pub parameters: Vec<Parameter>,
     /// Covariance of the estimated parameters, in their order; each entry in the product of their units.
@@ -284,9 +290,10 @@ impl Estimate {
     /// Number of estimated unknowns besides the poses of the frames.
     pub(crate) fn unknown_count(&self) -> usize {
         let of_panels = self.panels.iter().filter(|panel| panel.covariance.is_some()).count();
-        let of_cameras = self.cameras.iter().map(|camera| {
-            camera.estimated_parameters().count() + if camera.pose_sd.is_some() { 6 } else { 0 }
-        });
+        let of_cameras = self
+            .cameras
+            .iter()
+            .map(|camera| camera.unknown_count() + if camera.pose_sd.is_some() { 6 } else { 0 });
         let of_shape = self.shape.map_or(0, |found| found.sd_mm.len());
         let of_targets = self.targets.iter().filter(|target| target.pose_sd.is_some()).count();
         of_cameras.sum::<usize>() + 6 * (of_panels + of_targets) + of_shape
@@ -303,6 +310,7 @@ impl CameraEstimate {
             parameters: values.map(parameter).collect(),
             camera,
             model: None,
+            constraints: Vec::new(),
             covariance: Matrix::empty(),
             projection: None,
             ill_conditioned: Vec::new(),
@@ -354,6 +362,31 @@ impl CameraEstimate {
     pub fn correlation(&self, i: usize, j: usize) -> f64 {
         let c = &self.covariance;
         c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt()
+    }
+
+    /// The constraints on its parameters in words, such as `k3 fixed at 0; fx and fy equal`; `None` without any.
+    pub fn described_constraints(&self) -> Option<String> {
+        let value = |name: &String| self.parameters.iter().find(|p| p.name == *name);
+        let describe = |of: &Constraint| match of {
+            Constraint::Fixed { parameter, .. } => {
+                format!("{parameter} fixed at {}", value(parameter).map_or(0.0, |p| p.value))
+            }
+            Constraint::Equal { parameters } => format!("{} equal", parameters.join(" and ")),
+            Constraint::Prior { parameter, value, sd } => {
+                format!("{parameter} with the prior {value} ± {sd}")
+            }
+        };
+        let all: Vec<String> = self.constraints.iter().map(describe).collect();
+        (!all.is_empty()).then(|| all.join("; "))
+    }
+
+    /// Number of its unknown parameters; equal parameters are one unknown.
+    pub(crate) fn unknown_count(&self) -> usize {
+        let shared = self.constraints.iter().map(|of| match of {
+            Constraint::Equal { parameters } => parameters.len() - 1,
+            Constraint::Fixed { .. } | Constraint::Prior { .. } => 0,
+        });
+        self.estimated_parameters().count().saturating_sub(shared.sum())
     }
 
     /// The names of the estimated parameters.

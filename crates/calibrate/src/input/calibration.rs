@@ -6,6 +6,8 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use super::constraint::{Constrained, Constraint};
+use super::intrinsics::Intrinsics;
 use super::loss::Loss;
 use super::observation::{Sighting, View};
 use super::order::in_order;
@@ -13,9 +15,8 @@ use super::panel::{PanelPrior, PanelRef};
 use super::reference::Reference;
 use super::weights::Weights;
 use crate::cancel::Stop;
-use crate::error::CalibrationError;
-use crate::model::Model;
-use deltille_core::camera::{Camera, Pose};
+use crate::error::{CalibrationError, ConstraintError};
+use deltille_core::camera::Pose;
 use deltille_core::lattice::LatticeMap;
 use deltille_core::targets::{Target, TargetIdentity};
 
@@ -87,62 +88,23 @@ pub struct CameraViews {
     pub views: Vec<View>,
     /// Prior knowledge of its intrinsics.
     pub intrinsics: Intrinsics,
+    /// Constraints on its unknown parameters.
+    pub constraints: Vec<Constraint>,
     /// Its pose on the rig, if it is known. Without a given pose, the frame of the first camera is the rig frame.
     pub camera_from_rig: Option<Pose>,
-}
-
-/// Prior knowledge of the intrinsics of a camera.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Intrinsics {
-    /// Only the model is known; its parameters are estimated.
-    Unknown(Model),
-    /// All parameters are known and stay fixed.
-    Known(Camera),
-    /// All parameters are known approximately; some are estimated from these initial values.
-    Near {
-        /// The camera.
-        camera: Camera,
-        /// Which parameters are estimated, in the order of [`Camera::parameter_names`].
-        free: Vec<bool>,
-    },
-}
-
-impl From<Model> for Intrinsics {
-    fn from(model: Model) -> Self {
-        Self::Unknown(model)
-    }
-}
-
-impl From<Camera> for Intrinsics {
-    fn from(camera: Camera) -> Self {
-        Self::Known(camera)
-    }
-}
-
-impl Intrinsics {
-    /// The model to estimate; `None` if a camera was given.
-    pub fn model(&self) -> Option<Model> {
-        match self {
-            Self::Unknown(model) => Some(*model),
-            Self::Known(_) | Self::Near { .. } => None,
-        }
-    }
-
-    /// Which parameters are estimated.
-    pub(crate) fn free(&self) -> Vec<bool> {
-        match self {
-            Self::Unknown(model) => model.free(),
-            Self::Known(camera) => vec![false; camera.parameters().len()],
-            Self::Near { free, .. } => free.clone(),
-        }
-    }
 }
 
 impl CameraViews {
     /// Creates a camera whose pose on the rig is estimated.
     pub fn new(name: &str, views: Vec<View>, intrinsics: impl Into<Intrinsics>) -> Self {
         let (name, intrinsics) = (name.to_owned(), intrinsics.into());
-        Self { name, views, intrinsics, camera_from_rig: None }
+        Self { name, views, intrinsics, constraints: Vec::new(), camera_from_rig: None }
+    }
+
+    /// Its constraints.
+    pub(crate) fn constrained(&self) -> Result<Constrained, ConstraintError> {
+        let size_px = self.views.first().map_or([1, 1], |view| view.size_px);
+        Constrained::of(&self.constraints, &self.intrinsics, size_px)
     }
 }
 
@@ -226,6 +188,12 @@ impl Calibration {
     /// Replaces the intrinsics of the camera with this index.
     pub fn set_intrinsics(&mut self, camera: usize, intrinsics: impl Into<Intrinsics>) {
         self.cameras[camera].intrinsics = intrinsics.into();
+    }
+
+    /// Sets the constraints on the parameters of the camera with this index, see [`Constraint::check`]. They also apply to
+    /// the models that [`Self::choose_model`] tries: models without a constrained parameter are omitted.
+    pub fn set_constraints(&mut self, camera: usize, constraints: Vec<Constraint>) {
+        self.cameras[camera].constraints = constraints;
     }
 
     /// Sets the robust loss for corners with large residuals; the default is [`Loss::Huber`].

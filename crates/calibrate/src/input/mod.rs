@@ -8,13 +8,16 @@
 //!    `photographs` groups them by the camera that their EXIF metadata name.
 //! 3. `observation` is the content of an image: corners of panels (`panel`).
 //! 4. `calibration` collects cameras with their views and the settings, including `loss` and
-//!    `weights`.
+//!    `weights`. `intrinsics` describes what is known about a camera; `constraint`, parameters that are fixed, equal, or
+//!    have a prior.
 //! 5. `robot` describes the poses of a robot that moves the camera or the board.
 //!
 //! `order` sorts the names of frames by their numbers, and `sample` selects evenly spaced items.
 
 pub(crate) mod calibration;
+pub(crate) mod constraint;
 pub(crate) mod grid;
+pub(crate) mod intrinsics;
 pub(crate) mod loss;
 pub(crate) mod observation;
 pub(crate) mod order;

@@ -1,4 +1,5 @@
-//! The prior of the parameters of a camera: their values and covariance in an earlier calibration.
+//! The prior of the parameters of a camera: their values and covariance in an earlier calibration, or independent
+//! measurements.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,7 +8,7 @@ use deltille_core::camera::Camera;
 /// A ridge on correlations, because files round them.
 const RIDGE: f64 = 1e-9;
 
-/// Earlier values of the parameters of a camera.
+/// Known values of the parameters of a camera.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct CameraPrior {
     /// All parameters.
@@ -20,6 +21,29 @@ impl CameraPrior {
     /// Creates the prior; `None` if the covariance has no inverse.
     pub(crate) fn new(camera: &Camera, covariance: &DMatrix<f64>) -> Option<Self> {
         Some(Self { values: camera.parameters(), information: inverted(covariance)? })
+    }
+
+    /// Creates the prior from the index, value and standard deviation of some parameters; `None` if none of them is
+    /// estimated (`free`).
+    pub(crate) fn measured(
+        priors: &[(usize, f64, f64)],
+        camera: &Camera,
+        free: &[bool],
+    ) -> Option<Self> {
+        let mut values = camera.parameters();
+        let mut weights = vec![0.0; values.len()];
+        for &(i, value, sd) in priors.iter().filter(|(i, ..)| free[*i]) {
+            (values[i], weights[i]) = (value, sd.powi(-2));
+        }
+        let is_some = weights.iter().any(|weight| *weight > 0.0);
+        let of_free: Vec<f64> = (0..free.len()).filter(|&i| free[i]).map(|i| weights[i]).collect();
+        let information = DMatrix::from_diagonal(&DVector::from_vec(of_free));
+        is_some.then_some(Self { values, information })
+    }
+
+    /// Number of parameters with a known value, each of which counts as an observation.
+    pub(crate) fn count(&self) -> usize {
+        self.information.diagonal().iter().filter(|weight| **weight > 0.0).count()
     }
 
     /// The inverse covariance.

@@ -6,6 +6,7 @@ use nalgebra::{Matrix6, Vector6};
 
 use super::camera_prior::CameraPrior;
 use super::roughness::Roughness;
+use crate::input::constraint::Constrained;
 use crate::input::observation::Observation;
 use crate::input::panel::PanelRef;
 use crate::model::without_gauge;
@@ -24,7 +25,9 @@ pub(crate) struct CameraUnknowns {
     pub pose_free: bool,
     /// The prior of the knots of a spline.
     pub roughness: Option<Roughness>,
-    /// The prior of its parameters, from an earlier calibration.
+    /// Groups of parameters that share one unknown.
+    pub equal: Vec<Vec<usize>>,
+    /// The prior of its parameters.
     pub prior: Option<CameraPrior>,
 }
 
@@ -98,7 +101,30 @@ impl CameraUnknowns {
         let free = without_gauge(&camera.lens, free);
         let roughness = Roughness::of(&camera, &free);
         let camera_from_rig = Pose::IDENTITY;
-        Self { camera, free, camera_from_rig, pose_free: false, roughness, prior: None }
+        let equal = Vec::new();
+        Self { camera, free, camera_from_rig, pose_free: false, roughness, equal, prior: None }
+    }
+
+    /// The same with constraints on those of its parameters that are unknown.
+    pub(crate) fn constrained(camera: &Camera, free: Vec<bool>, by: &Constrained) -> Self {
+        let mut unknowns = Self::alone(by.apply(camera), free);
+        unknowns.equal.clone_from(&by.equal);
+        unknowns.prior = CameraPrior::measured(&by.priors, &unknowns.camera, &unknowns.free);
+        unknowns
+    }
+
+    /// The parameters of each unknown, in the order of the first of them.
+    pub(crate) fn groups(&self) -> Vec<Vec<usize>> {
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        for i in (0..self.free.len()).filter(|&i| self.free[i]) {
+            let equal = self.equal.iter().find(|equal| equal.contains(&i));
+            let other = equal.and_then(|equal| groups.iter_mut().find(|of| equal.contains(&of[0])));
+            match other {
+                Some(other) => other.push(i),
+                None => groups.push(vec![i]),
+            }
+        }
+        groups
     }
 
     /// Removes the prior of its knots.

@@ -10,7 +10,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 
 use crate::estimate::values::{Estimate, ViewEstimate};
-use crate::input::calibration::{Calibration, CameraViews, Intrinsics};
+use crate::input::calibration::{Calibration, CameraViews};
+use crate::input::intrinsics::Intrinsics;
 use crate::input::observation::View;
 use crate::input::order::in_order;
 use crate::input::sample::evenly;

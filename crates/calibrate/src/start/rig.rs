@@ -18,7 +18,8 @@ use super::symmetry::Symmetries;
 use crate::equations::minimise::{Until, minimise};
 use crate::error::CalibrationError;
 use crate::excluded::Excluded;
-use crate::input::calibration::{Calibration, CameraViews, Intrinsics};
+use crate::input::calibration::{Calibration, CameraViews};
+use crate::input::intrinsics::Intrinsics;
 use crate::input::loss::Loss;
 use crate::input::panel::PanelRef;
 use crate::problem::bundle::Problem;
@@ -89,15 +90,16 @@ pub(crate) fn start(
     let unknown =
         |((index, given), (found, pose)): ((usize, &CameraViews), ((Camera, _), &Pose))| {
             let (camera, roughness) = found;
-            CameraUnknowns {
+            let by = given.constrained()?;
+            Ok(CameraUnknowns {
                 roughness,
                 camera_from_rig: *pose,
                 pose_free: index > 0 && given.camera_from_rig.is_none(),
-                ..CameraUnknowns::alone(camera, given.intrinsics.free())
-            }
+                ..CameraUnknowns::constrained(&camera, by.free.clone(), &by)
+            })
         };
     let of_cameras = cameras.iter().enumerate().zip(found.into_iter().zip(&places.camera_from_rig));
-    problem.cameras = of_cameras.map(unknown).collect();
+    problem.cameras = of_cameras.map(unknown).collect::<Result<_, CalibrationError>>()?;
     problem.targets = targets_unknown(&blocks, calibration, &places.scene_from_target);
     problem.panels = unknowns(&blocks, calibration);
     // If the camera cannot image a corner at these initial values, no step can reach it.

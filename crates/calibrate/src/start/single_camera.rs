@@ -10,7 +10,9 @@ use super::splined::splined;
 use crate::equations::minimise::{Until, minimise};
 use crate::error::CalibrationError;
 use crate::excluded::Reason;
-use crate::input::calibration::{Calibration, CameraViews, Intrinsics};
+use crate::input::calibration::{Calibration, CameraViews};
+use crate::input::constraint::Constrained;
+use crate::input::intrinsics::Intrinsics;
 use crate::input::loss::Loss;
 use crate::input::observation::View;
 use crate::model::Model;
@@ -35,15 +37,16 @@ const PARALLEL_RAD: f64 = 0.05;
 pub(crate) fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
     let CameraViews { views, intrinsics, .. } = &calibration.cameras[0];
     let panels = calibration.panel_poses();
+    let by = calibration.cameras[0].constrained()?;
     let search = match intrinsics {
         Intrinsics::Unknown(model) => {
-            Search::without_guess(views, &panels, *model, calibration.start)?
+            Search::without_guess(views, &panels, &by, *model, calibration.start)?
         }
         Intrinsics::Known(camera) | Intrinsics::Near { camera, .. } => {
-            Search::with_camera(views, &panels, camera)?
+            Search::with_camera(views, &panels, &by, camera)?
         }
     };
-    let (used, problem) = search.problem(views, intrinsics.free());
+    let (used, problem) = search.problem(views, by.free.clone());
     let out = (0..views.len()).filter(|index| !used.contains(index));
     let excluded = out.map(|index| (index, views[index].excluded(Reason::NoPose))).collect();
     let frame =
@@ -65,6 +68,7 @@ struct Search<'a> {
     /// The views, with only those corners that agree with each other.
     views: Vec<View>,
     panels: &'a [Pose],
+    by: Constrained,
     camera: Camera,
     /// The prior of the knots of a spline that started from another lens.
     roughness: Option<Roughness>,
@@ -77,11 +81,12 @@ impl<'a> Search<'a> {
     fn without_guess(
         views: &[View],
         panels: &'a [Pose],
+        by: &Constrained,
         model: Model,
         start: Option<usize>,
     ) -> Result<Self, CalibrationError> {
         if let Model::Spline { degree, knots } = model {
-            return Self::of_spline(views, panels, degree, knots);
+            return Self::of_spline(views, panels, by, degree, knots);
         }
         enough(views.len(), views.len())?;
         let agreeing: Vec<View> = views.iter().map(agreeing).collect();
@@ -92,22 +97,27 @@ impl<'a> Search<'a> {
         let from = |(lens, scale): (Lens, f64)| {
             let camera = Camera::centred(width, height, scale * ideal.focal_px.x, lens);
             let (views, poses) = (agreeing.clone(), poses.clone());
-            let mut search = Search { views, panels, camera, roughness: None, poses };
-            search.adjust(model.coarse())?;
-            search.adjust(model.free())?;
+            let mut search =
+                Search { views, panels, by: by.clone(), camera, roughness: None, poses };
+            let free = &by.free;
+            let coarse = model.coarse().into_iter().zip(free).map(|(coarse, free)| coarse && *free);
+            search.adjust(coarse.collect())?;
+            search.adjust(free.clone())?;
             search.reestimate_poses();
-            search.adjust(model.free())?;
+            search.adjust(free.clone())?;
             Ok((search.error_px(), search))
         };
         // The best of all starts; an error if all fail.
         let starts = model.starts().into_iter().enumerate();
         let starts = starts.filter(|(index, _)| start.is_none_or(|start| start == *index));
         let found = starts.map(|(_, start)| from(start));
-        let error =
-            |found: &Result<(f64, Search), _>| found.as_ref().map_or(f64::INFINITY, |f| f.0);
+        let error = |found: &Result<(f64, Search), CalibrationError>| {
+            found.as_ref().map_or(f64::INFINITY, |f| f.0)
+        };
         let best = found.min_by(|a, b| error(a).total_cmp(&error(b)));
         let (_, search) = best.ok_or(CalibrationError::NoStart)??;
-        if panels.len() == 1 {
+        // A given focal length determines the distance.
+        if panels.len() == 1 && by.free[..2] == [true, true] {
             check_tilts(&search.poses)?;
         }
         Ok(search)
@@ -117,14 +127,16 @@ impl<'a> Search<'a> {
     fn of_spline(
         views: &[View],
         panels: &'a [Pose],
+        by: &Constrained,
         degree: usize,
         knots: Option<[usize; 2]>,
     ) -> Result<Self, CalibrationError> {
         let found = FORERUNNERS.map(|model| {
-            let search = Self::without_guess(views, panels, model, None)?;
-            Ok((search.error_px(), search.splined(model, degree, knots)))
+            let free = Constrained { free: model.free(), ..Constrained::default() };
+            let search = Search::without_guess(views, panels, &free, model, None)?;
+            Ok((search.error_px(), search.splined(by, model, degree, knots)))
         });
-        let error = |found: &Result<(f64, Option<Self>), _>| {
+        let error = |found: &Result<(f64, Option<Self>), CalibrationError>| {
             found.as_ref().map_or(f64::INFINITY, |(error, _)| *error)
         };
         let best = found.into_iter().min_by(|a, b| error(a).total_cmp(&error(b)));
@@ -132,17 +144,24 @@ impl<'a> Search<'a> {
     }
 
     /// The same search with the lens replaced by an equivalent spline.
-    fn splined(self, model: Model, degree: usize, knots: Option<[usize; 2]>) -> Option<Self> {
+    fn splined(
+        self,
+        by: &Constrained,
+        model: Model,
+        degree: usize,
+        knots: Option<[usize; 2]>,
+    ) -> Option<Self> {
         let sightings = self.views.iter().flat_map(|view| &view.sightings);
         let seen = sightings.flat_map(|sighting| &sighting.observations).map(|seen| seen.pixel);
         let (camera, roughness) = splined(&self.camera, &model.free(), seen, degree, knots)?;
-        Some(Self { camera, roughness: Some(roughness), ..self })
+        Some(Self { camera, by: by.clone(), roughness: Some(roughness), ..self })
     }
 
     /// Computes the poses of the views of a camera.
     fn with_camera(
         views: &[View],
         panels: &'a [Pose],
+        by: &Constrained,
         camera: &Camera,
     ) -> Result<Self, CalibrationError> {
         let size_px = [camera.width, camera.height];
@@ -154,15 +173,16 @@ impl<'a> Search<'a> {
             });
         }
         let views: Vec<View> = views.iter().map(agreeing).collect();
-        let pose = |view: &View| estimate_pose(camera, panels, &view.sightings);
+        let camera = by.apply(camera);
+        let pose = |view: &View| estimate_pose(&camera, panels, &view.sightings);
         let poses = views.iter().map(pose).collect();
-        Ok(Self { views, panels, camera: camera.clone(), roughness: None, poses })
+        Ok(Self { views, panels, by: by.clone(), camera, roughness: None, poses })
     }
 
     /// The views that have a pose and that the camera can image, and the problem that consists of
     /// their observations.
     fn problem(&self, views: &[View], free: Vec<bool>) -> (Vec<usize>, Problem) {
-        let mut camera = CameraUnknowns::alone(self.camera.clone(), free);
+        let mut camera = CameraUnknowns::constrained(&self.camera, free, &self.by);
         if let Some(roughness) = &self.roughness {
             camera.roughness = Some(roughness.clone());
         }

@@ -10,7 +10,7 @@
 //!     S = L (Σᵥ yᵥ yᵥᵀ) Lᵀ
 //! ```
 //!
-//! Priors, on the knots of a spline and on the offsets of corners, do not come from any frame: with P their part of the
+//! Priors, on parameters, on the knots of a spline and on the offsets of corners, do not come from any frame: with P their part of the
 //! normal equations, frames scatter only as I − LᵀPL, and LᵀPL is added with its nominal size.
 //!
 //! Errors that all frames have in common do not appear in the scatter; see [`super::board_errors`].
@@ -107,25 +107,30 @@ pub(crate) fn observed(
     })
 }
 
-/// LᵀPL of the priors on the knots of splines and on the offsets of corners; `None` without such priors.
+/// LᵀPL of the priors on parameters, on the knots of splines and on the offsets of corners; `None` without such priors.
 fn expected(minimum: &Minimum, whitening: &Whitening, found: &Covariances) -> Option<DMatrix<f64>> {
     let Minimum { problem, layout, .. } = minimum;
     let (mut matrix, mut right) =
         (DMatrix::zeros(layout.shared, layout.shared), DVector::zeros(layout.shared));
     let mut is_some = false;
     for (camera, parameters) in problem.cameras.iter().zip(&layout.parameters) {
-        let Some(roughness) = &camera.roughness else { continue };
-        roughness.add(&camera.camera, parameters, whitening.sigma, &mut matrix, &mut right);
-        is_some = true;
+        if let Some(roughness) = &camera.roughness {
+            roughness.add(&camera.camera, parameters, whitening.sigma, &mut matrix, &mut right);
+            is_some = true;
+        }
+        if let Some(prior) = &camera.prior {
+            prior.add(&camera.camera, parameters, whitening.sigma, &mut matrix, &mut right);
+            is_some = true;
+        }
     }
-    let of_knots = is_some.then(|| found.root.half.tr_mul(&matrix) * &found.root.half);
+    let of_cameras = is_some.then(|| found.root.half.tr_mul(&matrix) * &found.root.half);
     let of_corners = problem.map.as_ref().and_then(|map| {
         let part = of_offsets(minimum, whitening, found, map)?;
         Some(&part * part.transpose())
     });
-    match (of_knots, of_corners) {
-        (Some(of_knots), Some(of_corners)) => Some(of_knots + of_corners),
-        (of_knots, of_corners) => of_knots.or(of_corners),
+    match (of_cameras, of_corners) {
+        (Some(of_cameras), Some(of_corners)) => Some(of_cameras + of_corners),
+        (of_cameras, of_corners) => of_cameras.or(of_corners),
     }
 }
 

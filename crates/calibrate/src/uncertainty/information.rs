@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 
 use crate::adjust::reweighting::Settled;
 use crate::equations::covariances::Covariances;
+use crate::problem::camera_prior::inverted;
 use crate::problem::shape::COUNT as SHAPE_COEFFICIENTS;
 use deltille_core::statistics::median;
 
@@ -34,10 +35,8 @@ pub(crate) fn known_so_far(
         true => found.root.inverse.tr_mul(&found.root.inverse),
         false => {
             let of = |i: usize, j: usize| found.shared[(columns[i], columns[j])];
-            let scale: Vec<f64> = (0..n).map(|i| of(i, i).sqrt().recip()).collect();
-            let own = DMatrix::from_fn(n, n, |i, j| of(i, j) * scale[i] * scale[j]);
-            let inverse = own.cholesky()?.inverse();
-            DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j])
+            // Equal parameters have a correlation of 1.
+            inverted(&DMatrix::from_fn(n, n, of))?
         }
     };
     // W is triangular: the determinant of WᵀW is the square of its diagonal's product.

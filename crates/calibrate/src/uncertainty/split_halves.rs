@@ -30,10 +30,15 @@ pub(crate) fn raised(
     noise: &DMatrix<f64>,
 ) -> DMatrix<f64> {
     let count = equations.count();
-    let n = observed.nrows();
-    if count < 2 * MIN_VIEWS || equations.parameter_count() != n {
+    let (n, unknowns) = (equations.parameter_count(), equations.unknowns_of_parameters());
+    if count < 2 * MIN_VIEWS || unknowns.len() != observed.nrows() {
         return observed;
     }
+    // The first parameter of each unknown.
+    let first_of: Vec<usize> =
+        (0..n).filter_map(|unknown| unknowns.iter().position(|&of| of == unknown)).collect();
+    let of_parameters =
+        |off: &dyn Fn(usize) -> f64| DVector::from_fn(unknowns.len(), |i, _| off(i));
     let limit = SIGNIFICANT / (WAYS * (n + 1)) as f64;
     let ways: [&dyn Fn(usize) -> bool; WAYS] = [&|view| 2 * view < count, &|view| view % 2 == 0];
     // Fits all parameters separately for each half.
@@ -45,11 +50,13 @@ pub(crate) fn raised(
         // ratio that noise predicts for halves.
         let of_halves = |i: usize| {
             let half = first.noise_variance(i) + second.noise_variance(i);
-            (observed[(i, i)] * half / noise[(i, i)]).sqrt()
+            let at = (first_of[i], first_of[i]);
+            (observed[at] * half / noise[at]).sqrt()
         };
         let p_value =
             |i: usize| f_p_value((off[i] / of_halves(i)).powi(2), 1.0, (count - 2) as f64);
-        ((0..n).map(p_value).fold(1.0, f64::min) < limit).then_some(off)
+        let is_significant = (0..n).map(p_value).fold(1.0, f64::min) < limit;
+        is_significant.then(|| of_parameters(&|i| off[unknowns[i]]))
     });
     // Fits the focal lengths alone. With one common lens, halves that show the board differently
     // determine them better.
@@ -59,7 +66,7 @@ pub(crate) fn raised(
         columns.push(equations.weighted(Candidate::Focal, weights));
         let effect = equations.fit(&columns)?.effect(n, 2.0)?;
         let focal_px = camera.focal_px.to_array();
-        let off = DVector::from_fn(n, |i, _| focal_px.get(i).map_or(0.0, |px| px * effect.value));
+        let off = of_parameters(&|i| focal_px.get(i).map_or(0.0, |px| px * effect.value));
         (significance(effect) < limit).then_some(off)
     });
     let differences: Vec<DVector<f64>> = apart.chain(focal).collect();

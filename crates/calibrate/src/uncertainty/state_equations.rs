@@ -88,8 +88,8 @@ pub(crate) struct ViewEquations {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct StateEquations {
     pub views: Vec<ViewEquations>,
-    /// The parameters of the camera that have columns, by index.
-    free: Vec<usize>,
+    /// The parameters of the camera that have columns, by index; equal ones share a column.
+    free: Vec<Vec<usize>>,
     /// Whether all corners are those of one panel.
     pub is_of_one_panel: bool,
 }
@@ -139,7 +139,7 @@ impl StateEquations {
         order: &[usize],
     ) -> Option<Self> {
         let unknowns = &problem.cameras[camera];
-        let free: Vec<usize> = (0..unknowns.free.len()).filter(|&i| unknowns.free[i]).collect();
+        let free = unknowns.groups();
         if free.is_empty() {
             return None;
         }
@@ -178,7 +178,21 @@ impl StateEquations {
 
     /// Whether the first two unknowns of the camera are the focal lengths.
     pub(super) fn is_focal_free(&self) -> bool {
-        self.free.starts_with(&[0, 1])
+        self.column_of(0).is_some() && self.column_of(1).is_some()
+    }
+
+    /// The unknown of each parameter of the camera that has one, in the order of the parameters.
+    pub(super) fn unknowns_of_parameters(&self) -> Vec<usize> {
+        let groups = self.free.iter().enumerate();
+        let mut all: Vec<(usize, usize)> =
+            groups.flat_map(|(unknown, of)| of.iter().map(move |&i| (i, unknown))).collect();
+        all.sort_unstable();
+        all.into_iter().map(|(_, unknown)| unknown).collect()
+    }
+
+    /// The unknown of a parameter.
+    fn column_of(&self, parameter: usize) -> Option<usize> {
+        self.free.iter().position(|of| of.contains(&parameter))
     }
 
     /// The change of a parameter in a fit whose first columns are those of the camera, px. For a
@@ -195,8 +209,7 @@ impl StateEquations {
             let column = Candidate::CAMERA.iter().position(|&of| of == candidate);
             return column.map_or(0.0, |column| px * fit.beta[column]);
         }
-        let column = self.free.iter().position(|&free| free == parameter);
-        column.map_or(0.0, |column| fit.beta[column])
+        self.column_of(parameter).map_or(0.0, |column| fit.beta[column])
     }
 
     /// The columns of the camera.
@@ -398,7 +411,7 @@ struct Equations<'a> {
     whitening: &'a Whitening,
     loss: Loss,
     camera: usize,
-    free: Vec<usize>,
+    free: Vec<Vec<usize>>,
     middle: DVec3,
     reach: f64,
 }
@@ -438,8 +451,8 @@ impl Equations<'_> {
                 let motion = by_motion(&at, point);
                 let mut rows = [DVector::zeros(n), DVector::zeros(n)];
                 for (i, row) in rows.iter_mut().enumerate() {
-                    for (column, &parameter) in free.iter().enumerate() {
-                        row[column] = at.by_parameter(parameter)[i];
+                    for (column, parameters) in free.iter().enumerate() {
+                        row[column] = parameters.iter().map(|&of| at.by_parameter(of)[i]).sum();
                     }
                     let sheet = by_sheet(uv, by_place[i], reach);
                     let candidates = by_candidates(i, off[i], ramp * by_point[i], sheet);
@@ -549,7 +562,7 @@ mod tests {
             }
         };
         let views = (0..views).map(view).collect();
-        StateEquations { views, free: vec![0, 1], is_of_one_panel: true }
+        StateEquations { views, free: vec![vec![0], vec![1]], is_of_one_panel: true }
     }
 
     /// Sums over the views before and after a change give the same as a fit of it, and its standard deviation from the
