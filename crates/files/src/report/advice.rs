@@ -166,7 +166,9 @@ impl Topic {
     fn of(diagnosis: &Diagnosis) -> Self {
         match diagnosis {
             Diagnosis::NonMonotonicLens { camera, .. } => Self::Lens(*camera),
-            Diagnosis::IllConditioned { camera, .. } => Self::Parameters(*camera),
+            Diagnosis::WrongPrior { camera, .. } | Diagnosis::IllConditioned { camera, .. } => {
+                Self::Parameters(*camera)
+            }
             Diagnosis::CommonOutliers(_) => Self::Errors,
             Diagnosis::Remedied { .. }
             | Diagnosis::LackOfFit(_)

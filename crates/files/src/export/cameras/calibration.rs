@@ -3,6 +3,7 @@
 
 use serde::Serialize;
 
+use super::constraint::{ConstraintRecord, constraints};
 use super::estimate::{
     CoverageRecord, DiagnosisRecord, MapRecord, ParameterRecord, ProjectionRecord, ShapeRecord,
     ViewRecord, correlations, coverage, diagnoses, map, parameters, projection, shape, spline,
@@ -29,6 +30,8 @@ struct CalibrationFile<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     spline: Option<SplineGrid>,
     parameters: Vec<ParameterRecord<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    constraints: Vec<ConstraintRecord>,
     correlations: Vec<Vec<f64>>,
     ill_conditioned: &'a [String],
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -84,6 +87,7 @@ pub fn write(
         height: camera.camera.height,
         spline: spline(camera),
         parameters: parameters(camera),
+        constraints: constraints(camera),
         correlations: correlations(camera),
         ill_conditioned: &camera.ill_conditioned,
         projection: projection(camera),

@@ -206,6 +206,9 @@ pub(in crate::export) struct DiagnosisRecord<'a> {
     significance: Option<f64>,
     #[serde(skip_serializing_if = "<[String]>::is_empty")]
     parameters: &'a [String],
+    /// Difference between a prior and the views, in standard deviations.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    deviations: Option<f64>,
     /// A smaller lens model that fits as well.
     #[serde(skip_serializing_if = "Option::is_none")]
     sufficient: Option<String>,
@@ -526,6 +529,13 @@ pub(in crate::export) fn diagnoses<'a>(
                 kind: "poor_fit",
                 camera: name(*camera),
                 rms_px: Some(*rms_px),
+                ..text
+            },
+            Diagnosis::WrongPrior { camera, parameter, deviations } => DiagnosisRecord {
+                kind: "wrong_prior",
+                camera: name(*camera),
+                parameters: std::slice::from_ref(parameter),
+                deviations: Some(*deviations),
                 ..text
             },
             Diagnosis::IllConditioned { camera, parameters, sufficient } => DiagnosisRecord {

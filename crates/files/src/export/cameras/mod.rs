@@ -1,13 +1,15 @@
 //! Calibrations and their applications.
 //!
-//! [`calibration`] and [`rig`] write estimates with the records of `estimate`, `finding` and `motion`. [`saved`] reads them back;
+//! [`calibration`] and [`rig`] write estimates with the records of `estimate`, `constraint`, `finding` and `motion`. [`saved`] reads them back;
 //! [`sheet`] reads only their data about the print. [`camera`] writes the formats of other programs, and `format` is the table of
-//! these formats. [`check`], [`comparison`], [`hand_eye`], [`pose`], [`next_view`], [`undistortion`] and [`truth`] are the results of other commands.
+//! these formats. [`covariance`] writes the covariance of a calibration. [`check`], [`comparison`], [`hand_eye`], [`pose`], [`next_view`], [`undistortion`] and [`truth`] are the results of other commands.
 
 pub mod calibration;
 pub mod camera;
 pub mod check;
 pub mod comparison;
+pub(super) mod constraint;
+pub mod covariance;
 pub(super) mod estimate;
 pub(super) mod finding;
 pub(super) mod format;

@@ -3,6 +3,7 @@
 
 use serde::Serialize;
 
+use super::constraint::{ConstraintRecord, constraints};
 use super::estimate::{
     CoverageRecord, DiagnosisRecord, JointRecord, MapRecord, ParameterRecord, Print,
     ProjectionRecord, Residuals, ShapeRecord, ViewRecord, correlations, coverage, diagnoses, joint,
@@ -76,6 +77,8 @@ struct Camera<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     spline: Option<SplineGrid>,
     parameters: Vec<ParameterRecord<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    constraints: Vec<ConstraintRecord>,
     correlations: Vec<Vec<f64>>,
     ill_conditioned: &'a [String],
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -201,6 +204,7 @@ fn of_camera<'a>(
         coverage: coverage(found),
         spline: spline(found),
         parameters: parameters(found),
+        constraints: constraints(found),
         correlations: correlations(found),
         ill_conditioned: &found.ill_conditioned,
         projection: projection(found),

@@ -85,6 +85,7 @@ impl Kind {
             let head = &content[..content.len().min(HEAD)];
             match contains(head, b"3dmanufacturing") || contains(content, b"3D/3dmodel.model") {
                 true => signed("3MF", contains(head, b"<!-- deltille ")),
+                false if contains(head, b"names.npy") => Self::words("named arrays of NumPy"),
                 false => Self::words("a ZIP"),
             }
         } else if content.starts_with(b"deltille ") && content.get(80..84).is_some() {

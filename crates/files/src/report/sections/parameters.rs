@@ -76,5 +76,9 @@ pub(in crate::report) fn section(camera: &CameraEstimate) -> String {
     let table = format!(
         "<div class=\"wide-table\"><table class=\"plain\"><tr><th>name</th><th>value</th>{heads}</tr>{rows}</table></div>"
     );
-    html::section("Parameters", &format!("<div class=\"plots\">{table}{matrix}</div>"))
+    let constrained = match camera.described_constraints() {
+        Some(text) => format!("<p>Constraints: {}.</p>", escaped(&text)),
+        None => String::new(),
+    };
+    html::section("Parameters", &format!("{constrained}<div class=\"plots\">{table}{matrix}</div>"))
 }

@@ -8,6 +8,7 @@ use deltille_calibrate::{
 use deltille_core::camera::{Camera, Lens, LensKind, PROJECTION_PARAMETERS, Pose, SplineGrid};
 use glam::{DVec2, DVec3};
 
+use super::super::constraint::ConstraintRecord;
 use super::error::SavedError;
 use super::record::{
     Fit, Rig, RigHeldOut, SavedCamera, SavedCorner, SavedExcluded, SavedFrame, SavedJoint,
@@ -197,6 +198,7 @@ impl SavedCamera {
         let mut camera = CameraEstimate::given(name, blank.with_parameters(&values));
         camera.model = self.model.parse().ok();
         camera.parameters = parameters.collect();
+        camera.constraints = self.constraints.into_iter().map(ConstraintRecord::read).collect();
         camera.covariance = covariance;
         camera.projection = projection;
         camera.ill_conditioned = self.ill_conditioned;

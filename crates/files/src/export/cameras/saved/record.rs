@@ -4,6 +4,7 @@ use glam::{DMat3, DQuat, DVec3};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 
+use super::super::constraint::ConstraintRecord;
 use super::super::sheet::StoredShape;
 use deltille_calibrate::SHAPE_COEFFICIENTS as COUNT;
 use deltille_core::camera::{Pose, SplineGrid, is_rotation};
@@ -91,6 +92,8 @@ pub(super) struct SavedCamera {
     pub(super) rms_px: f64,
     pub(super) spline: Option<SplineGrid>,
     pub(super) parameters: Vec<SavedParameter>,
+    #[serde(default)]
+    pub(super) constraints: Vec<ConstraintRecord>,
     #[serde(deserialize_with = "quantity::figure::de")]
     pub(super) correlations: Vec<Vec<f64>>,
     #[serde(alias = "loose")]
