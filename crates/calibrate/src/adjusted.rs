@@ -55,6 +55,7 @@ impl Calibration {
         let views = own.cameras.iter_mut().flat_map(|camera| &mut camera.views);
         views.for_each(|view| view.sightings = Vec::new());
         let settled = own.smoothed(&gross, settled)?;
+        let settled = own.with_weighted_priors(&gross, settled)?;
         let (settled, f_ratio) = match own.board_shape {
             true => own.bent(&gross, settled)?,
             false => (settled, 0.0),

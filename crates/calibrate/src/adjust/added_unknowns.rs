@@ -1,4 +1,4 @@
-//! Unknowns that are added to an adjustment: smoothness of splines, shape of a board, offsets of corners.
+//! Unknowns that are added to an adjustment, and weights of priors: smoothness of splines, shape of a board, offsets of corners.
 
 use super::reweighting::{Kept, Settled, settle, variance};
 use super::wrong_views::Gross;
@@ -54,6 +54,25 @@ impl Calibration {
                 .ok_or(CalibrationError::NoStart)?;
         }
         let problem = all.at(&minimum.problem);
+        settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)
+    }
+
+    /// Weights the priors of parameters by the a-posteriori variance of the corners, instead of their variance by the
+    /// median.
+    pub(crate) fn with_weighted_priors(
+        &self,
+        gross: &Gross,
+        settled: Settled,
+    ) -> Result<Settled, CalibrationError> {
+        let variance = variance(&settled.minimum, &settled.whitening, self.loss);
+        let ratio = variance / settled.whitening.sigma.powi(2);
+        let has_priors = settled.problem.cameras.iter().any(|camera| camera.prior.is_some());
+        if !has_priors || !ratio.is_finite() || ratio <= 0.0 {
+            return Ok(settled);
+        }
+        let mut problem = settled.problem;
+        let priors = problem.cameras.iter_mut().filter_map(|camera| camera.prior.as_mut());
+        priors.for_each(|prior| prior.scale(ratio));
         settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)
     }
 

@@ -370,7 +370,7 @@ mod tests {
         let fixed = found(&[Constraint::fixed("k3=0.02").unwrap()]);
         let tight = found(&[Constraint::prior("k3=0.02±1e-7").unwrap()]);
         assert_eq!(value(&fixed, "k3"), (0.02, None));
-        assert!((value(&tight, "k3").1.unwrap() / 1e-7 - 1.0).abs() < 0.05);
+        assert!((value(&tight, "k3").1.unwrap() / 1e-7 - 1.0).abs() < 0.01);
         same(&fixed, &tight, 0.01);
         same(&free, &found(&[Constraint::prior("k3=5±1e6").unwrap()]), 0.01);
     }

@@ -41,6 +41,11 @@ impl CameraPrior {
         is_some.then_some(Self { values, information })
     }
 
+    /// Multiplies the inverse covariance by a factor.
+    pub(crate) fn scale(&mut self, factor: f64) {
+        self.information *= factor;
+    }
+
     /// Number of parameters with a known value, each of which counts as an observation.
     pub(crate) fn count(&self) -> usize {
         self.information.diagonal().iter().filter(|weight| **weight > 0.0).count()
