@@ -10,10 +10,13 @@
 //!    properties of its print.
 //! 4. `filming` finds the target in photographs and recordings, instead of detections; `reasons` says why none shows it.
 //! 5. `solving` calls the library with a given or selected model, and prints the uncertainty of the result.
-//! 6. `report_page` writes the report, with the photographs that it shows.
+//!    `constraints` are its options for fixed, equal and measured parameters.
+//! 6. `report_page` writes the report, with the photographs that it shows; `covariance_file`, the covariance.
 //! 7. `compare` tests whether two results differ significantly.
 
 pub mod compare;
+pub mod constraints;
+pub mod covariance_file;
 pub mod filming;
 pub mod guide;
 pub mod one_camera;

@@ -10,7 +10,7 @@ use super::report_page::check_images;
 use super::sightings::{Sightings, SightingsArgs};
 use super::solving::{
     Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out,
-    projection_uncertainty, richest, sample, without_outliers,
+    projection_uncertainty, richest, sample, with_constraints, without_outliers,
 };
 use crate::deltille::files::camera_file;
 use crate::deltille::files::written::{
@@ -44,7 +44,7 @@ pub struct Args {
     ))]
     model: Option<ModelChoice>,
     /// Estimate only poses, with this fixed camera: a file written by this command, ROS or OpenCV
-    #[arg(long, value_name = "CAMERA", conflicts_with_all = ["model", "holdout", "board_shape"])]
+    #[arg(long, value_name = "CAMERA", conflicts_with_all = ["model", "holdout", "board_shape", "fix", "equal", "prior"])]
     fixed_intrinsics: Option<PathBuf>,
     #[command(flatten)]
     solve: SolveArgs,
@@ -77,15 +77,19 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let candidates = args.candidates();
     let (intrinsics, known_with) = args.intrinsics(&candidates)?;
+    args.solve.constraints.check_cameras(&[])?;
+    args.solve.constraints.check(&stem, &intrinsics, &candidates)?;
     let folder = output::folder_of(&path);
     let sample = sample(&intrinsics);
-    let (planned, refused) = args.files(&stem, &sample, &[], &[], &sample_of(calibration::SCHEMA));
+    let (planned, refused) =
+        args.files(&stem, (&sample, None), &[], &[], &sample_of(calibration::SCHEMA));
     if let (true, Some(refused)) = (planned.is_empty(), refused.into_iter().next()) {
         return Err(refused).context("--format");
     }
     let planned: Vec<File> = planned.into_iter().chain(args.solve.planned(&stem)).collect();
     check_places(folder, &planned, args.overwrite)?;
     let page = args.solve.page(&stem, args.overwrite)?;
+    args.solve.covariance.check(args.overwrite, &[path.with_extension("json")])?;
     let measure = args.solve.measures_target();
     let Sightings { calibration, views, target, empty, left_out, print, unnamed, .. } =
         args.sightings.read(&intrinsics, measure)?;
@@ -100,7 +104,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(folder) = &args.images {
         check_images(folder, &views)?;
     }
+    let constraints = args.solve.constraints.of(&stem, &intrinsics);
     let mut calibration = calibration.camera(&stem, views, intrinsics);
+    calibration.set_constraints(0, constraints);
     let model = args.model.unwrap_or(ModelChoice::Auto);
     let tried = model.choose(&mut calibration, 0, &candidates)?;
     let listed = chosen(&tried);
@@ -128,7 +134,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             Some(_) => &estimate.calibrated_with,
             None => &known_with,
         };
-        (files, refused) = args.files(&stem, &camera.camera, of_camera, &views, &json);
+        (files, refused) =
+            args.files(&stem, (&camera.camera, Some(camera)), of_camera, &views, &json);
     }
     files.extend(solved.measured(&stem, target.as_ref()));
     let mut written = write_all(folder, &files, args.overwrite)?;
@@ -136,6 +143,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         solved.write_page(&page, &stem, &[args.images.as_deref()], args.overwrite)?;
         written.push(page);
     }
+    written.extend(args.solve.covariance.write(&solved, args.overwrite)?);
     let mut text = listed + &table(&solved.estimate);
     for line in solved.lines() {
         text += &(line + "\n");
@@ -170,16 +178,17 @@ impl Args {
     /// Returns the models that are compared.
     fn candidates(&self) -> Vec<Model> {
         let is_supported = |camera: &Camera| {
-            self.files("", camera, &[], &[], &sample_of(calibration::SCHEMA)).1.is_empty()
+            self.files("", (camera, None), &[], &[], &sample_of(calibration::SCHEMA)).1.is_empty()
         };
         self.model.unwrap_or(ModelChoice::Auto).candidates(is_supported)
     }
 
-    /// Returns the camera in all requested formats, and errors for those that failed; `json` is the complete result.
+    /// Returns the camera in all requested formats, and errors for those that failed; `found` is its estimate, and `json`
+    /// the complete result.
     fn files(
         &self,
         stem: &str,
-        camera: &Camera,
+        (camera, found): (&Camera, Option<&CameraEstimate>),
         calibrated_with: &[TargetIdentity],
         views: &[(&str, Pose)],
         json: &str,
@@ -200,7 +209,10 @@ impl Args {
                 continue;
             }
             match format.text(&Written { file: &file, name: stem, views }) {
-                Ok(text) => files.push(text_file(format!("{stem}{}", format.end), text)),
+                Ok(text) => {
+                    let text = if format.is_own() { with_constraints(&text, found) } else { text };
+                    files.push(text_file(format!("{stem}{}", format.end), text));
+                }
                 Err(error) => refused.push(error),
             }
             if format.is_own() {
@@ -250,6 +262,9 @@ fn of_camera(camera: &CameraEstimate) -> String {
             "spline of degree {degree} with {columns} × {rows} knots, {fov_x_deg}° across"
         );
     }
+    if let Some(constraints) = camera.described_constraints() {
+        let _ = writeln!(text, "constraints: {constraints}");
+    }
     if let Some(line) = projection_uncertainty(camera) {
         let _ = writeln!(text, "{line}");
     }
@@ -258,7 +273,8 @@ fn of_camera(camera: &CameraEstimate) -> String {
     for i in 0..found.len() {
         for j in i + 1..found.len() {
             let correlation = camera.correlation(i, j);
-            if correlation.abs() >= STRONG_CORRELATION {
+            // Equal parameters have a correlation of 1.
+            if (STRONG_CORRELATION..1.0 - 1e-9).contains(&correlation.abs()) {
                 let _ =
                     writeln!(text, "{} and {}: correlation {correlation:.3}", found[i], found[j]);
             }

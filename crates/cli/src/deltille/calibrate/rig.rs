@@ -11,7 +11,7 @@ use super::sightings;
 use super::sightings::{GridArgs, SheetArgs};
 use super::solving::{
     Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out,
-    projection_uncertainty, richest, sample, without_outliers,
+    projection_uncertainty, richest, sample, with_constraints, without_outliers,
 };
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::written::{
@@ -101,7 +101,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let candidates = args.candidates(&names);
     let cameras = names.iter().map(|name| args.intrinsics(name, &targets, &candidates));
     let cameras = cameras.collect::<anyhow::Result<Vec<Intrinsics>>>()?;
+    args.solve.constraints.check_cameras(&names)?;
+    for (name, intrinsics) in names.iter().zip(&cameras) {
+        let checked = args.solve.constraints.check(name, intrinsics, &candidates);
+        checked.with_context(|| format!("camera {name}"))?;
+    }
     args.check_files(&names, &cameras, &printed)?;
+    args.solve.covariance.check(args.overwrite, &[args.output.join("rig.json")])?;
     let page = args.solve.page("rig", args.overwrite)?;
     let mut calibration = Calibration::of(&reference, panels).refine_panels(args.refine_target);
     let (mut left_out, mut ink, mut seen) = (Vec::new(), Vec::new(), Vec::new());
@@ -128,7 +134,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         if let Some(folder) = of_name(&args.images, name) {
             check_images(folder, &views)?;
         }
-        calibration = calibration.with(CameraViews::new(name, views, intrinsics));
+        let constraints = args.solve.constraints.of(name, &intrinsics);
+        let camera = CameraViews { constraints, ..CameraViews::new(name, views, intrinsics) };
+        calibration = calibration.with(camera);
     }
     let (mut tried, mut text) = (Vec::new(), String::new());
     for (index, Source { name, option, .. }) in sources.iter().enumerate() {
@@ -168,6 +176,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         solved.write_page(&page, "rig", &folders, args.overwrite)?;
         written.push(page);
     }
+    written.extend(args.solve.covariance.write(&solved, args.overwrite)?);
     for line in text.lines() {
         say!("{line}");
     }
@@ -244,7 +253,8 @@ impl Args {
             let calibrated_with = if is_known { Vec::new() } else { found.calibrated_with.clone() };
             let failed = failed.clone().filter(|_| !is_known);
             let yaml = CameraFile { camera, calibrated_with, failed }.to_yaml();
-            files.push(text_file(format!("{name}.yaml"), yaml));
+            let found = found.cameras.iter().find(|found| found.name == **name);
+            files.push(text_file(format!("{name}.yaml"), with_constraints(&yaml, found)));
         }
         if failed.is_some() {
             // Only rig.json contains the reason for a failure.
@@ -347,6 +357,8 @@ fn summary(solved: &Calibrated) -> String {
             without_outliers(camera.outlier_count(), camera.inlier_rms_px()),
             at.to_array().map(|mm| fixed(mm, 2)).join(", ")
         ));
+        let constraints = camera.described_constraints();
+        lines.extend(constraints.map(|said| format!("{}: constraints: {said}", camera.name)));
         lines.extend(projection_uncertainty(camera).map(|line| format!("{}: {line}", camera.name)));
     }
     for ([first, second], depth) in estimate.depth_uncertainties() {

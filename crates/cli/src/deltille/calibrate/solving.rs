@@ -8,6 +8,8 @@ use std::str::FromStr;
 use anyhow::{Context, anyhow, bail, ensure};
 use clap::ValueEnum;
 
+use super::constraints::ConstraintArgs;
+use super::covariance_file::CovarianceArgs;
 use crate::deltille::files::written::{File, sample_of, text_file};
 use crate::output::{self, Overwrite, log};
 use crate::run::FAILED;
@@ -58,6 +60,10 @@ pub struct SolveArgs {
     /// Include every corner with its residual in the .json (150 bytes each)
     #[arg(long)]
     residuals: bool,
+    #[command(flatten)]
+    pub constraints: ConstraintArgs,
+    #[command(flatten)]
+    pub covariance: CovarianceArgs,
     /// Write an HTML report on the quality of the calibration, and how to improve it
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
@@ -310,7 +316,8 @@ impl Calibrated {
         }
     }
 
-    fn has_failed(&self) -> bool {
+    /// Whether the result must not be used unchanged.
+    pub fn has_failed(&self) -> bool {
         self.diagnoses.iter().any(Diagnosis::is_failure)
     }
 
@@ -378,6 +385,15 @@ pub fn projection_uncertainty(camera: &CameraEstimate) -> Option<String> {
     };
     (!listed.is_empty())
         .then(|| format!("projection uncertainty (1σ): {}{board}", listed.join("; ")))
+}
+
+/// Adds the constraints on a camera to its file, as a comment.
+pub fn with_constraints(yaml: &str, camera: Option<&CameraEstimate>) -> String {
+    let said = camera.and_then(CameraEstimate::described_constraints);
+    match (said, yaml.split_once('\n')) {
+        (Some(said), Some((first, rest))) => format!("{first}\n# constraints: {said}\n{rest}"),
+        _ => yaml.to_owned(),
+    }
 }
 
 /// Returns a camera with nonzero values for all estimated parameters, to reject formats that cannot represent it
