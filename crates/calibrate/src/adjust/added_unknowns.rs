@@ -57,7 +57,7 @@ impl Calibration {
         settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)
     }
 
-    /// Weights the priors of parameters by the a-posteriori variance of the corners, instead of their variance by the
+    /// Weights the priors of parameters by the variance of unit weight, instead of the variance of the corners by the
     /// median.
     pub(crate) fn with_weighted_priors(
         &self,

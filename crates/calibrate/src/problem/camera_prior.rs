@@ -46,7 +46,7 @@ impl CameraPrior {
         self.information *= factor;
     }
 
-    /// Number of parameters with a known value, each of which counts as an observation.
+    /// Number of parameters with a known value. Each counts as an observation.
     pub(crate) fn count(&self) -> usize {
         self.information.diagonal().iter().filter(|weight| **weight > 0.0).count()
     }
