@@ -57,8 +57,7 @@ impl Calibration {
         settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)
     }
 
-    /// Weights the priors of parameters by the variance of unit weight, instead of the variance of the corners by the
-    /// median.
+    /// Weights the priors of parameters by the variance of unit weight, not by that of the median.
     pub(crate) fn with_weighted_priors(
         &self,
         gross: &Gross,
