@@ -98,6 +98,10 @@ pub const HAND_EYE: &str = "Examples:
   deltille handeye photos --robot poses.csv --target desk/desk.json --camera camera.json
   deltille handeye corners --robot poses.txt --target desk/desk.json --eye-to-hand -o handeye.json";
 
+pub const TIMING: &str = "Examples:
+  deltille timing camera.json waved.mp4 --target desk/desk.json
+  deltille timing rig.json waved.mcap --topic /left/image_raw --topic /right/image_raw --target desk/desk.json -o timing.json";
+
 pub const UNDISTORT: &str = "Examples:
   deltille undistort photos --camera camera.yaml -o straight
   deltille undistort run.mcap --topic /left/image_raw --every 30 --camera left.yaml -o straight";

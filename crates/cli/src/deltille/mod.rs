@@ -23,7 +23,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use self::apply::{check, hand_eye, pose, undistort};
+use self::apply::{check, hand_eye, pose, timing, undistort};
 use self::calibrate::{compare, guide, one_camera, rig};
 use self::make::{aprilgrid, board, charuco, circles, plan, solid, verify};
 use self::measure::{bench, experiment};
@@ -136,6 +136,12 @@ enum Command {
     /// names its photograph, else by time stamp, else by order.
     #[command(name = "handeye", after_help = examples::HAND_EYE)]
     HandEye(Box<hand_eye::Args>),
+    /// Estimate rolling shutters, and offsets of the clocks of a rig, from a recording of a moving target
+    ///
+    /// The recording must contain all frames; move the target smoothly and fast, but without motion blur of more than a few
+    /// pixels.
+    #[command(after_help = examples::TIMING)]
+    Timing(timing::Args),
     /// Undistort images to a pinhole projection, or write the remap tables
     #[command(after_help = examples::UNDISTORT)]
     Undistort(undistort::Args),
@@ -163,6 +169,7 @@ pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
         Command::Compare(args) => compare::run(args),
         Command::Guide(args) => guide::run(*args),
         Command::HandEye(args) => hand_eye::run(*args),
+        Command::Timing(args) => timing::run(args),
         Command::Plan(args) => plan::run(args),
         Command::Board(args) => board::run(GridKind::Deltille, *args),
         Command::Checkerboard(args) => board::run(GridKind::Checker, *args),

@@ -22,7 +22,7 @@ pub use cameras::format::{
 };
 pub use cameras::{
     calibration, camera, check, comparison, covariance, hand_eye, next_view, pose, rig, saved,
-    sheet, truth, undistortion,
+    sheet, timing, truth, undistortion,
 };
 pub use detections::format::{DETECTION_FORMATS, DetectionFormat};
 #[cfg(feature = "overlay")]

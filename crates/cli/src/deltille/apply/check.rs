@@ -23,8 +23,8 @@ use deltille::calibrate::{
     Answer, Calibration, CameraEstimate, CameraViews, Check, Estimate, Intrinsics, Missing, Model,
     QuantityTest, Reference, Suspect,
 };
+use deltille::export::check;
 use deltille::export::kind::Kind;
-use deltille::export::{check, saved};
 use deltille::frames::is_bag;
 use deltille::layout::Printing;
 use deltille::limits::Limits;
@@ -209,25 +209,7 @@ impl Args {
     /// Reads the calibration; a camera file without uncertainties is accepted, because its answer is `cannot tell`.
     fn before(&self, target: &Target) -> anyhow::Result<Estimate> {
         let path = &self.camera;
-        let is_json = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("json"));
-        let mut before = match is_json {
-            true => {
-                let text = Limits::default().read_text(path).context("CAMERA")?;
-                let mut before = saved::read_without_target(&text)
-                    .with_context(|| format!("CAMERA: {}", path.display()))?;
-                if camera_file::warn_if_failed(path, &text).is_some() {
-                    before.cameras.iter_mut().for_each(CameraEstimate::forget_uncertainties);
-                }
-                before
-            }
-            false => {
-                let file = camera_file::read_with_targets("CAMERA", path)?;
-                let mut before = Estimate::default();
-                before.cameras = vec![CameraEstimate::given("", file.camera)];
-                before.calibrated_with = file.calibrated_with;
-                before
-            }
-        };
+        let mut before = camera_file::read_estimate("CAMERA", path)?;
         let names: Vec<&str> = before.cameras.iter().map(|camera| camera.name.as_str()).collect();
         match (self.cameras.is_empty(), self.photographs.as_slice()) {
             (false, _) => ensure!(

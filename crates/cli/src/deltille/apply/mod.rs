@@ -6,9 +6,11 @@
 //! 2. `undistort`: photographs undistorted to a pinhole projection, or the remap tables; for two cameras of a rig,
 //!    rectified images (`deltille rectify`);
 //! 3. `check`: whether the camera is still as calibrated;
-//! 4. `hand_eye`: where the camera and the board are mounted on a robot.
+//! 4. `hand_eye`: where the camera and the board are mounted on a robot;
+//! 5. `timing`: when the rows of each camera are exposed.
 
 pub mod check;
 pub mod hand_eye;
 pub mod pose;
+pub mod timing;
 pub mod undistort;

@@ -241,6 +241,31 @@ impl Film<'_> {
         Ok(Seen { keyframes: keyframes.finish(), ..seen })
     }
 
+    /// Follows the target through all images of each camera, and returns all detections. Ctrl-C ends the reading.
+    pub fn follow(&self, reference: &Reference) -> anyhow::Result<Vec<Vec<(String, Detection)>>> {
+        let detector = detector(reference)?;
+        interrupt::keeps_results();
+        let progress = Mutex::new(FrameProgress::new(None));
+        let of_camera = |camera: &FilmCamera| {
+            let (mut tracker, mut found) = (Tracker::new(detector.clone()), Vec::new());
+            for frame in camera.images.frames(&camera.options, true) {
+                if interrupt::is_raised() {
+                    break;
+                }
+                let frame = frame?;
+                let (stem, part) = (frame.stem(), frame.part());
+                let one = self.one(frame, |image, name| tracker.detect(image, name))?;
+                let mut progress = progress.lock().expect("no thread panics here");
+                progress.add(!one.grids.is_empty(), part);
+                found.push((stem, one));
+            }
+            Ok(found)
+        };
+        let found = self.cameras.par_iter().map(of_camera).collect();
+        progress.into_inner().expect("no thread panics here").end();
+        found
+    }
+
     /// Half of the shortest interval between frames: within it, no frame has two possible partners.
     fn tolerance_ns(&self) -> anyhow::Result<i64> {
         let intervals = self.cameras.iter().map(|camera| {

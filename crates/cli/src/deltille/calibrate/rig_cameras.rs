@@ -9,7 +9,7 @@ use super::filming::{self, Film, FilmCamera, Given};
 use super::sightings;
 use crate::deltille::files::images::Images;
 use crate::values::whole;
-use deltille::calibrate::{Intrinsics, Reference};
+use deltille::calibrate::{Intrinsics, Model, Reference};
 use deltille::frames::{FrameOptions, Frames, FramesError, Problem, is_recording};
 use deltille::limits::Limits;
 use deltille::targets::Name;
@@ -179,7 +179,37 @@ impl CamerasArgs {
     }
 }
 
+/// Follows the target through all images of each camera, or reads its detections. Nothing is selected.
+pub fn follow(
+    sources: &[Source],
+    reference: &Reference,
+    limits: &Limits,
+) -> anyhow::Result<Vec<Given>> {
+    let paths: Vec<PathBuf> = sources.iter().map(|source| source.path.clone()).collect();
+    if !filming::are_images(&paths)? {
+        let given = sources.iter().map(|source| {
+            let given = sightings::given(std::slice::from_ref(&source.path), limits);
+            given.with_context(|| source.option.clone())
+        });
+        return given.collect();
+    }
+    // Only a selection of frames depends on the intrinsics.
+    let intrinsics = Intrinsics::Unknown(Model::Radtan);
+    let cameras = sources
+        .iter()
+        .map(|source| source.camera(&intrinsics, limits).with_context(|| source.option.clone()));
+    let cameras = cameras.collect::<anyhow::Result<_>>()?;
+    let detections = Film { cameras, every: 1, views: None, limits }.follow(reference)?;
+    let given = detections.into_iter().zip(&paths);
+    Ok(given.map(|(detections, path)| Given::of_images(detections, path)).collect())
+}
+
 impl Source {
+    /// The images of a single camera.
+    pub fn alone(path: PathBuf, topic: Option<String>) -> Self {
+        Self { name: String::new(), option: path.display().to_string(), path, topic }
+    }
+
     /// Lists the images of the camera. Opens a recording, so that a wrong topic is reported before the first frame is read.
     fn camera<'a>(
         &'a self,

@@ -5,9 +5,11 @@ use std::path::Path;
 use anyhow::{Context, anyhow};
 
 use crate::output::log;
+use deltille::calibrate::{CameraEstimate, Estimate};
 use deltille::camera::{Camera, CameraFile};
 use deltille::camera_file;
 use deltille::export::saved;
+use deltille::limits::Limits;
 use deltille::targets::{Target, TargetIdentity, check_same_board};
 use deltille_core::words::shown;
 
@@ -70,6 +72,24 @@ fn warn_of(path: &Path, failure: Option<&str>) {
     if let Some(failure) = failure {
         log!("warning: {}: the calibration failed: {}", path.display(), shown(failure));
     }
+}
+
+/// Reads a calibration, the .json of `calibrate` or `rig`, or a camera file; without uncertainties if it failed.
+pub fn read_estimate(option: &str, path: &Path) -> anyhow::Result<Estimate> {
+    if !path.extension().is_some_and(|end| end.eq_ignore_ascii_case("json")) {
+        let file = read_with_targets(option, path)?;
+        let mut estimate = Estimate::default();
+        estimate.cameras = vec![CameraEstimate::given("", file.camera)];
+        estimate.calibrated_with = file.calibrated_with;
+        return Ok(estimate);
+    }
+    let text = Limits::default().read_text(path).context(option.to_owned())?;
+    let mut estimate = saved::read_without_target(&text)
+        .with_context(|| format!("{option}: {}", path.display()))?;
+    if warn_if_failed(path, &text).is_some() {
+        estimate.cameras.iter_mut().for_each(CameraEstimate::forget_uncertainties);
+    }
+    Ok(estimate)
 }
 
 /// Reads a camera to be fixed in another calibration; fails if its own calibration failed.

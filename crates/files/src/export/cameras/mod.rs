@@ -2,7 +2,7 @@
 //!
 //! [`calibration`] and [`rig`] write estimates with the records of `estimate`, `constraint`, `finding` and `motion`. [`saved`] reads them back;
 //! [`sheet`] reads only their data about the print. [`camera`] writes the formats of other programs, and `format` is the table of
-//! these formats. [`covariance`] writes the covariance of a calibration. [`check`], [`comparison`], [`hand_eye`], [`pose`], [`next_view`], [`undistortion`] and [`truth`] are the results of other commands.
+//! these formats. [`covariance`] writes the covariance of a calibration. [`check`], [`comparison`], [`hand_eye`], [`pose`], [`next_view`], [`timing`], [`undistortion`] and [`truth`] are the results of other commands.
 
 pub mod calibration;
 pub mod camera;
@@ -20,5 +20,6 @@ pub mod pose;
 pub mod rig;
 pub mod saved;
 pub mod sheet;
+pub mod timing;
 pub mod truth;
 pub mod undistortion;

@@ -1,0 +1,200 @@
+//! `deltille timing`.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, bail, ensure};
+
+use crate::deltille::calibrate::rig_cameras::{
+    CamerasArgs, Source, check_named, follow, named, topic,
+};
+use crate::deltille::calibrate::sightings;
+use crate::deltille::files::limits::ImageLimits;
+use crate::deltille::files::{camera_file, target_file};
+use crate::interrupt;
+use crate::output::{self, Overwrite};
+use deltille::calibrate::{CameraTiming, Estimate, Reference, TimedCamera, Timing, timing};
+use deltille::export::kind::Kind;
+use deltille::export::timing as timing_file;
+
+/// Arguments of `deltille timing`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// The calibrated camera or rig: the .json of `deltille calibrate` or `deltille rig`, or a camera file
+    #[arg(value_name = "CAMERA")]
+    camera: PathBuf,
+    /// A video, an MCAP file or a bag in which the target moves; for a rig, a recording of all cameras. Or detections of all
+    /// frames with their time stamps, from `deltille detect --track`
+    #[arg(
+        required_unless_present = "cameras",
+        value_name = "RECORDING",
+        conflicts_with = "cameras"
+    )]
+    recording: Option<PathBuf>,
+    /// Camera of the rig and its video, recording or folder of detections, such as left=left.mp4; repeat for each camera
+    #[arg(long = "camera", id = "cameras", value_name = "NAME=PATH", value_parser = named)]
+    cameras: Vec<(String, PathBuf)>,
+    /// Topic of the images in an MCAP file or a bag; for a rig, that of each camera, such as left=/left/image_raw
+    #[arg(long, value_name = "[NAME=]TOPIC", value_parser = topic)]
+    topic: Vec<(Option<String>, String)>,
+    /// Target description: the .json written with the target, or a .dsc
+    #[arg(long, value_name = "FILE")]
+    target: PathBuf,
+    /// Use --target even if the camera was calibrated with a board with the same tags but a different size
+    #[arg(long)]
+    assume_target: bool,
+    /// Write the result
+    #[arg(short, long, value_name = "FILE.json")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    limits: ImageLimits,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+/// Estimates when the rows of each camera are exposed.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let path =
+        args.output.as_deref().map(|path| output::file(path, "timing", "json")).transpose()?;
+    if let Some(path) = &path {
+        args.overwrite.check(path, &Kind::of_schema(timing_file::SCHEMA))?;
+    }
+    let limits = args.limits.limits();
+    let printing = target_file::read_placed(&args.target, &limits).context("--target")?;
+    let known = camera_file::read_estimate("CAMERA", &args.camera)?;
+    let targets = std::slice::from_ref(&printing.target);
+    camera_file::check_or_note(&args.camera, &known.calibrated_with, targets, args.assume_target)?;
+    let sources = args.sources(&known)?;
+    let reference = Reference::Target(&printing.target);
+    let given = follow(&sources, &reference, &limits)?;
+    let mut cameras = Vec::new();
+    for (source, given) in sources.iter().zip(given) {
+        let of = known.cameras.iter().find(|of| known.cameras.len() == 1 || of.name == source.name);
+        let of = of.context("no camera")?;
+        let read = sightings::views_of(given, &reference, args.assume_target)
+            .with_context(|| source.option.clone())?;
+        let times: BTreeMap<&str, i64> = read
+            .detections
+            .iter()
+            .filter_map(|(name, found)| Some((name.as_str(), found.time_ns?)))
+            .collect();
+        ensure!(
+            !times.is_empty() || read.detections.is_empty(),
+            "{}: no time stamps; give a video, a recording, or their detections",
+            source.option
+        );
+        let mut views = read.views;
+        sightings::take_known(&mut views, &reference);
+        let size = [of.camera.width, of.camera.height];
+        if let Some(other) = views.iter().find(|view| view.size_px != size) {
+            let [width, height] = other.size_px;
+            bail!(
+                "{}: the images have {width} × {height} px, the camera {} × {} px",
+                source.option,
+                size[0],
+                size[1]
+            );
+        }
+        let stamped =
+            views.into_iter().filter_map(|view| Some((*times.get(view.name.as_str())?, view)));
+        let views = stamped.collect();
+        let (name, camera, camera_from_rig) =
+            (of.name.clone(), of.camera.clone(), of.camera_from_rig);
+        cameras.push(TimedCamera { name, camera, camera_from_rig, views });
+    }
+    let panels: Vec<_> = reference.panels().iter().map(|of| of.target_from_panel).collect();
+    let found = timing(&cameras, &panels)?;
+    if let Some(path) = &path {
+        output::write(path, timing_file::write(&found).as_bytes(), args.overwrite)?;
+    }
+    output::print(&describe(&found))?;
+    if interrupt::has_ended_input() {
+        return Ok(ExitCode::from(interrupt::exit_code()));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+impl Args {
+    /// The recording of each camera, in the order of the cameras.
+    fn sources(&self, known: &Estimate) -> anyhow::Result<Vec<Source>> {
+        let names: Vec<&str> = known.cameras.iter().map(|of| of.name.as_str()).collect();
+        let (recording, camera, topic) =
+            (self.recording.clone(), self.cameras.clone(), self.topic.clone());
+        if let ([_], Some(path)) = (names.as_slice(), &recording) {
+            let topic = match topic.as_slice() {
+                [] => None,
+                [(None, topic)] => Some(topic.clone()),
+                _ => bail!("--topic: one camera has one topic, without a name"),
+            };
+            return Ok(vec![Source::alone(path.clone(), topic)]);
+        }
+        ensure!(
+            names.len() > 1,
+            "--camera: {} has one camera; give its recording without --camera",
+            self.camera.display()
+        );
+        let of_rig = CamerasArgs { recording, camera, topic, every: 1, views: None };
+        let mut sources = of_rig.sources(&names, true)?;
+        let option = if self.cameras.is_empty() { "--topic" } else { "--camera" };
+        check_named(option, sources.iter().map(|source| source.name.as_str()), &names)?;
+        if let Some(missing) = names.iter().find(|name| !sources.iter().any(|of| of.name == **name))
+        {
+            bail!("{option}: no images of {missing}; give those of all cameras of the rig");
+        }
+        sources.sort_by_key(|source| names.iter().position(|name| *name == source.name));
+        Ok(sources)
+    }
+}
+
+/// Describes the timing, one camera per line.
+fn describe(found: &Timing) -> String {
+    let mut text = String::new();
+    let first = found.cameras.first().map_or("", |of| &of.name);
+    for of in &found.cameras {
+        let name = if of.name.is_empty() { String::new() } else { format!("{}: ", of.name) };
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{name}{}", readout(of));
+        if let Some(offset) = of.offset_s {
+            let [ms, sd] = [offset.value, offset.sd].map(|s| 1e3 * s);
+            let drift = of.drift.map_or(String::new(), |drift| {
+                format!(", drift {:.1} ± {:.1} ppm", 1e6 * drift.value, 1e6 * drift.sd)
+            });
+            let _ = writeln!(
+                text,
+                "{name}images are taken {ms:.3} ± {sd:.3} ms after those of {first} with the same time stamp{drift}"
+            );
+        } else if of.name != first {
+            let _ = writeln!(
+                text,
+                "{name}the offset to {first} is undetermined: move the target faster"
+            );
+        }
+    }
+    let _ = writeln!(
+        text,
+        "{} frames with motion, every {:.2} ms, median speed {:.0} px/s, RMS {:.4} px per axis",
+        found.frames,
+        1e3 * found.interval_s,
+        found.speed_px_s,
+        found.rms_px
+    );
+    text
+}
+
+/// Describes the shutter of a camera.
+fn readout(of: &CameraTiming) -> String {
+    let Some(readout) = of.readout_s else {
+        return "the readout is undetermined: move the target faster".to_owned();
+    };
+    let [ms, sd] = [readout.value, readout.sd].map(|s| 1e3 * s);
+    match readout.is_significant() {
+        true => format!(
+            "rolling shutter, readout {ms:.3} ± {sd:.3} ms, {:.3} µs per row; corners are displaced by up to {:.1} px",
+            1e3 * ms / f64::from(of.height),
+            0.5 * of.shear_px
+        ),
+        false => format!("no rolling shutter: readout {ms:.3} ± {sd:.3} ms"),
+    }
+}
