@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 
-use super::solving::Calibrated;
 use crate::output::{self, Overwrite, log};
+use deltille::calibrate::Estimate;
 use deltille::export::covariance::CovarianceFormat;
 use deltille::export::kind::Kind;
 
@@ -37,15 +37,16 @@ impl CovarianceArgs {
     /// Writes the file and returns its path. A failed calibration has no covariance.
     pub fn write(
         &self,
-        solved: &Calibrated,
+        estimate: &Estimate,
+        has_failed: bool,
         overwrite: Overwrite,
     ) -> anyhow::Result<Option<PathBuf>> {
         let Some(path) = &self.covariance else { return Ok(None) };
-        if solved.has_failed() {
+        if has_failed {
             log!("warning: {OPTION}: not written, because the calibration failed");
             return Ok(None);
         }
-        let Some(shared) = &solved.estimate.shared else {
+        let Some(shared) = &estimate.shared else {
             log!("warning: {OPTION}: not written, because only poses of views were estimated");
             return Ok(None);
         };

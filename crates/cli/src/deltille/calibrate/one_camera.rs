@@ -143,7 +143,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         solved.write_page(&page, &stem, &[args.images.as_deref()], args.overwrite)?;
         written.push(page);
     }
-    written.extend(args.solve.covariance.write(&solved, args.overwrite)?);
+    written.extend(args.solve.covariance.write(
+        &solved.estimate,
+        solved.has_failed(),
+        args.overwrite,
+    )?);
     let mut text = listed + &table(&solved.estimate);
     for line in solved.lines() {
         text += &(line + "\n");

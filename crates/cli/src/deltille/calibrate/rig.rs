@@ -176,7 +176,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         solved.write_page(&page, "rig", &folders, args.overwrite)?;
         written.push(page);
     }
-    written.extend(args.solve.covariance.write(&solved, args.overwrite)?);
+    written.extend(args.solve.covariance.write(
+        &solved.estimate,
+        solved.has_failed(),
+        args.overwrite,
+    )?);
     for line in text.lines() {
         say!("{line}");
     }
