@@ -35,6 +35,19 @@ def test_a_camera_is_calibrated_with_its_uncertainties(calibration, camera, dete
     assert calibration.excluded == [] and all(said.sentence for said in calibration.diagnoses)
 
 
+def test_parameters_are_fixed_equal_or_measured_before(detections, board, camera):
+    fx, _, cx, *_ = camera.parameters
+    constrained = {"fix": ["k2", "p1=0.001"], "equal": "fx,fy", "prior": f"cx={cx}±0.5"}
+    found = deltille.calibrate(detections, board, **constrained)
+    values = dict(zip(found.camera.parameter_names, found.camera.parameters))
+    assert values["k2"] == 0 and values["p1"] == 0.001 and values["fx"] == values["fy"]
+    sd = dict(zip(found.camera.parameter_names, found.sd))
+    assert abs(values["fx"] - fx) < 5 * sd["fx"] and sd["cx"] < 0.5 and sd["fx"] == sd["fy"]
+    for wrong in ({"fix": "zz"}, {"equal": "fx"}, {"prior": "cx=640"}, {"fix": "fx"}):
+        with pytest.raises(deltille.CalibrationError):
+            deltille.calibrate(detections, board, **wrong)
+
+
 def test_the_next_view_is_where_the_uncertainty_is_largest(board, camera, detections):
     first = deltille.next_view([], board, size_px=(1280, 960))
     assert first.uncertainty_px is None and not first.is_enough() and "facing the camera" in first.description

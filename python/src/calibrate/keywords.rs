@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyMapping;
 
 use super::calibration::{Calibration, Rig, calibration};
-use super::solving::{How, ModelChoice, OneCamera, Seen, named, solve};
+use super::solving::{How, ModelChoice, OneCamera, Seen, Texts, constraints, named, solve};
 use crate::boundary::errors::{self, RaiseFile, raised};
 use crate::see::camera::Camera;
 use crate::see::detection::{Detection, Results, Targets};
@@ -60,6 +60,13 @@ use crate::see::detector::sides;
 /// board_accuracy_mm : float, optional
 ///     Standard deviation of the board's corners from the description, mm, for the observed uncertainties. Defaults to 0.1,
 ///     but at most 0.5 % of an edge; for a measured target, to the value in its file.
+/// fix : str or sequence of str, optional
+///     Parameters that are not estimated, such as ``"k3"`` or ``"k3=0.01"``. Without a value, ``cx`` and ``cy`` are fixed at
+///     the image centre, and coefficients of distortion at 0; other parameters need a value.
+/// equal : str or sequence of str, optional
+///     Parameters with one common value, such as ``"fx,fy"``.
+/// prior : str or sequence of str, optional
+///     Parameters that were measured before, with their standard deviations, such as ``"cx=960±2"`` or ``"cx=960+-2"``.
 ///
 /// Returns
 /// -------
@@ -73,7 +80,7 @@ use crate::see::detector::sides;
 #[pyo3(signature = (detections, target = None, model = "radtan", *, camera = None, grid = None, rows = None,
     cols = None, edge_mm = None, hold_out = None, loss = "huber", weights = "covariance", board_shape = false,
     measure_target = false, shape = None, print_scale = None, distances_mm = None, names = None,
-    assume_target = false, board_accuracy_mm = None))]
+    assume_target = false, board_accuracy_mm = None, fix = None, equal = None, prior = None))]
 #[expect(clippy::too_many_arguments, reason = "keywords")]
 pub fn calibrate(
     py: Python<'_>,
@@ -96,10 +103,14 @@ pub fn calibrate(
     names: Option<Vec<String>>,
     assume_target: bool,
     board_accuracy_mm: Option<f64>,
+    fix: Option<Texts>,
+    equal: Option<Texts>,
+    prior: Option<Texts>,
 ) -> PyResult<Py<Calibration>> {
     let mut how = How::of(loss, weights, hold_out, distances_mm, print_scale, board_accuracy_mm)?;
     (how.board_shape, how.measure_target) = (board_shape, measure_target);
     how.assume_target = assume_target;
+    how.constraints = constraints(fix, equal, prior)?;
     let target = target.or_else(|| of_detections(&detections.all, grid.is_some()));
     let seen = Seen::of(target, grid, sides(rows, cols)?, edge_mm)?;
     if let Some(path) = shape {

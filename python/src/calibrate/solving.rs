@@ -5,8 +5,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use deltille::calibrate::{
-    Calibration, CalibrationError, Candidate, Diagnosis, Estimate, Excluded, Intrinsics, Loss,
-    Messages, Model, PanelPrior, Reference, UntaggedGrid, View, Weights, views,
+    Calibration, CalibrationError, Candidate, Constraint, ConstraintError, Diagnosis, Estimate,
+    Excluded, Intrinsics, Loss, Messages, Model, PanelPrior, Reference, UntaggedGrid, View,
+    Weights, views,
 };
 use deltille::export::calibration::{Print, Residuals};
 use deltille::export::sheet::Sheet;
@@ -106,6 +107,7 @@ pub struct How {
     pub distances_mm: Vec<f64>,
     pub board_accuracy_mm: Option<f64>,
     pub assume_target: bool,
+    pub constraints: Vec<Constraint>,
     pub sheet: Sheet,
 }
 
@@ -157,9 +159,49 @@ impl How {
             distances_mm,
             board_accuracy_mm: accuracy_mm.transpose()?,
             assume_target: false,
+            constraints: Vec::new(),
             sheet: Sheet { print_scale, ..Sheet::default() },
         })
     }
+}
+
+/// One text or several.
+#[derive(FromPyObject)]
+pub enum Texts {
+    One(String),
+    Several(Vec<String>),
+}
+
+/// Parses constraints on a camera: fixed, equal and measured parameters.
+pub fn constraints(
+    fix: Option<Texts>,
+    equal: Option<Texts>,
+    prior: Option<Texts>,
+) -> PyResult<Vec<Constraint>> {
+    type Parse = fn(&str) -> Result<Constraint, ConstraintError>;
+    let all: [(&str, Option<Texts>, Parse, bool); 3] = [
+        ("fix", fix, Constraint::fixed, true),
+        ("equal", equal, Constraint::equal, false),
+        ("prior", prior, Constraint::prior, true),
+    ];
+    let mut found = Vec::new();
+    for (keyword, texts, parse, is_list) in all {
+        let texts = match texts {
+            None => Vec::new(),
+            Some(Texts::One(text)) => vec![text],
+            Some(Texts::Several(texts)) => texts,
+        };
+        for text in &texts {
+            let parts: Vec<&str> = if is_list { text.split(',').collect() } else { vec![text] };
+            for part in parts {
+                let parsed = parse(part).map_err(|error| {
+                    errors::calibration(format!("{keyword}: {}", errors::one_line(&error)))
+                });
+                found.push(parsed?);
+            }
+        }
+    }
+    Ok(found)
 }
 
 /// Reads the print scale across and up the sheet: measured over nominal length, one number or two.
@@ -427,6 +469,10 @@ pub fn solve(
         let count = all.len();
         for (name, views, intrinsics) in all {
             calibration = calibration.camera(&name, views, intrinsics);
+        }
+        // Only `calibrate` has constraints, with one camera.
+        if count == 1 {
+            calibration.set_constraints(0, how.constraints);
         }
         let mut models = vec![Vec::new(); count];
         for (index, tried) in models.iter_mut().enumerate() {

@@ -172,7 +172,8 @@ impl Calibration {
         Self { identities, symmetries, ..calibration.board_accuracy_mm(accuracy_mm) }
     }
 
-    /// Adds a camera: a [`Model`] for an unknown lens, or a known [`Camera`] that stays fixed.
+    /// Adds a camera: a [`Model`](crate::Model) for an unknown lens, or a known [`Camera`](deltille_core::camera::Camera) that
+    /// stays fixed.
     #[must_use]
     pub fn camera(self, name: &str, views: Vec<View>, intrinsics: impl Into<Intrinsics>) -> Self {
         self.with(CameraViews::new(name, views, intrinsics))
