@@ -1,5 +1,6 @@
 //! Errors of a calibration and their messages.
 
+use deltille_core::quantity::OutOfRange;
 use std::fmt;
 
 use deltille_core::setting::Setting::CalibrationRefinePanels;
@@ -65,7 +66,23 @@ pub enum ConstraintError {
         /// Name of the parameter.
         parameter: String,
     },
-    /// A value outside its range.
+    /// A value of a parameter outside the range of camera files.
+    #[error("{parameter}: {problem}")]
+    Value {
+        /// Name of the parameter.
+        parameter: String,
+        /// Its value and the range.
+        problem: OutOfRange,
+    },
+    /// Equal parameters of different kinds.
+    #[error(
+        "{parameters} are different quantities and cannot be equal; parameters of one kind can, such as fx,fy"
+    )]
+    DifferentKinds {
+        /// Their names.
+        parameters: String,
+    },
+    /// A focal length or a standard deviation that is not positive.
     #[error("{what} of {parameter} must be a positive finite number, not {value}")]
     OutOfRange {
         /// Name of the parameter.

@@ -362,7 +362,7 @@ fn said(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
     before.chain(ends).chain(gross).chain(causes).chain(priors).chain(open).collect()
 }
 
-/// The priors of a camera that its views contradict.
+/// The priors of a camera that its views contradict: the estimate is far from the prior, or the views alone are.
 ///
 /// With the prior m ± d, the value x from the views alone and the estimate, x − m is (estimate − m) / (1 − k), where
 /// k = (σ / d)² is the weight of the prior; its variance is d² + σₓ².
@@ -378,7 +378,8 @@ fn wrong_priors(camera: usize, of: &CameraEstimate) -> Vec<Diagnosis> {
         let noise = found.sd?;
         let observed = observed.unwrap_or(noise).max(noise);
         let variance = sd * sd - 2.0 * noise * noise + observed * observed;
-        let deviations = (found.value - value).abs() / variance.max(f64::MIN_POSITIVE).sqrt();
+        let off = (found.value - value).abs();
+        let deviations = (off / sd).max(off / variance.max(f64::MIN_POSITIVE).sqrt());
         (deviations > WRONG_PRIOR_SIGMA).then(|| Diagnosis::WrongPrior {
             camera,
             parameter: found.name.clone(),

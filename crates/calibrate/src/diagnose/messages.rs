@@ -89,7 +89,8 @@ impl<'a> Messages<'a> {
                 *camera,
                 format!(
                     "the prior of {parameter} differs from its value in the views by {deviations:.1} standard \
-                     deviations: the measurement or its standard deviation is wrong, or the lens does not fit its model"
+                     deviations: the measurement or its standard deviation is wrong, or the lens or the board does not fit \
+                     its description"
                 ),
             ),
             Diagnosis::IllConditioned { camera, parameters, sufficient } => {

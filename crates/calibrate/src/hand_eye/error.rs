@@ -88,8 +88,8 @@ pub enum HandEyeError {
     },
     /// The given noise is impossible, or so small that the poses contradict each other.
     #[error(
-        "the given noise of the robot is impossible, or so small that the poses contradict each other: it must be between \
-         0.0001° and 57° and between 0.001 mm and 1000 mm; state a larger one, or let it be estimated"
+        "the poses of the robot contradict each other by far more than the given noise explains, or it is not between 0.0001° \
+         and 57° and between 0.001 mm and 1000 mm: state a larger one, or let it be estimated"
     )]
     Noise,
     /// The equations have no solution.

@@ -5,6 +5,7 @@ use std::fmt;
 use super::intrinsics::Intrinsics;
 use crate::error::ConstraintError;
 use deltille_core::camera::{Camera, Lens, PROJECTION_PARAMETERS};
+use deltille_core::quantity::{coefficient, focal_px, place_px};
 
 /// A constraint on the parameters of a camera that are estimated. Parameters are named as in
 /// [`Camera::parameter_names`]. Its text, such as `k3=0.01`, `fx,fy` or `cx=960±2`, is what [`Self::fixed`],
@@ -182,9 +183,7 @@ impl Constrained {
                     let value = value.ok_or_else(|| ConstraintError::NoDefault {
                         parameter: parameter.clone(),
                     })?;
-                    if i < 2 {
-                        positive(parameter, "the value", value)?;
-                    }
+                    in_range(&start.lens, parameter, i, value)?;
                     all.free[i] = false;
                     all.fixed.push((i, value));
                 }
@@ -192,11 +191,18 @@ impl Constrained {
                     let mut group: Vec<usize> =
                         parameters.iter().map(index).collect::<Result<_, _>>()?;
                     group.sort_unstable();
+                    let kind = |i: usize| (i / 2).min(PROJECTION_PARAMETERS.len() / 2);
+                    if group.iter().any(|&i| kind(i) != kind(group[0])) {
+                        let parameters = parameters.join(", ");
+                        return Err(ConstraintError::DifferentKinds { parameters });
+                    }
                     all.equal.push(group);
                 }
                 Constraint::Prior { parameter, value, sd } => {
                     positive(parameter, "the standard deviation", *sd)?;
-                    all.priors.push((index(parameter)?, *value, *sd));
+                    let i = index(parameter)?;
+                    in_range(&start.lens, parameter, i, *value)?;
+                    all.priors.push((i, *value, *sd));
                 }
             }
         }
@@ -241,6 +247,18 @@ fn default(start: &Camera, i: usize) -> Option<f64> {
     });
     let is_zero = i >= PROJECTION_PARAMETERS.len() && start.parameters()[i] == 0.0;
     centre.or(is_zero.then_some(0.0))
+}
+
+/// Rejects a value that a camera file may not have.
+fn in_range(lens: &Lens, parameter: &str, i: usize, value: f64) -> Result<(), ConstraintError> {
+    let of_lens = i.checked_sub(PROJECTION_PARAMETERS.len());
+    let range = match of_lens {
+        None if i < 2 => focal_px::RANGE,
+        None => place_px::RANGE,
+        Some(i) => lens.ranges().get(i).copied().unwrap_or(coefficient::RANGE),
+    };
+    let checked = range.check(value).map(|_| ());
+    checked.map_err(|problem| ConstraintError::Value { parameter: parameter.to_owned(), problem })
 }
 
 fn positive(parameter: &str, what: &'static str, value: f64) -> Result<(), ConstraintError> {

@@ -34,6 +34,9 @@ const SETTLED: f64 = 1e-6;
 /// Offsets are searched in half intervals, up to this number on both sides.
 const SEARCHED: i32 = 8;
 
+/// Largest RMS residual, relative to the longer side of the image: as in a check of a camera.
+const FITS: f64 = 0.005;
+
 /// The ratio of the median of the length of a two-dimensional normal vector to its standard deviation per axis.
 const MEDIAN_LENGTH: f64 = 1.177;
 
@@ -44,7 +47,7 @@ type Stamped<'a> = Vec<(f64, &'a View)>;
 /// target; `panels` are the poses of its panels. Views in which the target is at rest contribute nothing.
 ///
 /// # Errors
-/// Returns an error if too few successive frames of the first camera show the target.
+/// Returns an error if too few successive frames of the first camera show the target, or if the images do not fit any timing.
 pub fn timing(cameras: &[TimedCamera], panels: &[Pose]) -> Result<Timing, TimingError> {
     let too_few = |frames: usize| TimingError::TooFew {
         camera: cameras.first().map_or(String::new(), |of| of.name.clone()),
@@ -103,7 +106,12 @@ pub fn timing(cameras: &[TimedCamera], panels: &[Pose]) -> Result<Timing, Timing
             break;
         }
     }
-    Ok(setting.result(&setting.groups(&path, &clocks), &clocks, scale))
+    let found = setting.result(&setting.groups(&path, &clocks), &clocks, scale);
+    let sides = cameras.iter().map(|of| of.camera.width.max(of.camera.height));
+    if found.rms_px > FITS * f64::from(sides.max().unwrap_or(0)) {
+        return Err(TimingError::Fit { rms_px: found.rms_px, searched: SEARCHED / 2 });
+    }
+    Ok(found)
 }
 
 /// What does not change during the iterations.
@@ -212,13 +220,19 @@ impl<'a> Setting<'a> {
         Some(matrix.cholesky()?.solve(&right))
     }
 
-    /// The covariance of the unknowns from the scatter of the scores of the frames. Scores of near frames are correlated,
+    /// The variances of the unknowns from the scatter of the scores of the frames. Scores of near frames are correlated,
     /// because they share poses and vibrations (Newey & West 1987).
-    fn covariance(&self, equations: &[Option<OfGroup>], clocks: &[Clock]) -> Option<DMatrix<f64>> {
+    fn variances(
+        &self,
+        equations: &[Option<OfGroup>],
+        clocks: &[Clock],
+        sigma: f64,
+    ) -> Option<Vec<f64>> {
         let (matrix, _) = self.sum(equations, clocks);
         let inverse = matrix.cholesky()?.inverse();
+        let noise = &inverse * (sigma * sigma);
         let scores: Vec<&DVector<f64>> = equations.iter().flatten().map(|of| &of.right).collect();
-        let lags = (scores.len() as f64).cbrt().ceil() as usize;
+        let lags = lags(scores.len());
         let mut scatter = DMatrix::zeros(inverse.nrows(), inverse.nrows());
         for (index, score) in scores.iter().enumerate() {
             scatter += *score * score.transpose();
@@ -228,20 +242,29 @@ impl<'a> Setting<'a> {
                 scatter += (&both + both.transpose()) * weight;
             }
         }
-        Some(&inverse * scatter * &inverse)
+        let observed = &inverse * scatter * &inverse;
+        // Images that are equal have no scatter.
+        let variance = |i: usize| f64::max(observed[(i, i)], noise[(i, i)]);
+        Some((0..inverse.nrows()).map(variance).collect())
     }
 
     fn result(&self, groups: &[(usize, Group<'_>)], clocks: &[Clock], scale: Scale) -> Timing {
         let equations = self.equations(groups, clocks, scale);
-        let covariance = self.covariance(&equations, clocks);
+        let variances = self.variances(&equations, clocks, scale.sigma);
         let raw = || equations.iter().flatten().flat_map(|of| of.raw.iter());
         let squares: f64 = raw().map(|(squared, _)| squared).sum();
         let speeds = |camera: usize| {
             let of = equations.iter().flatten().map(move |of| of.speed_px_s[camera]);
             of.filter(|speed| *speed > 0.0).collect::<Vec<_>>()
         };
+        let images = |camera: usize| {
+            let images = groups.iter().flat_map(|(_, group)| &group.images);
+            images.filter(|(of, ..)| *of == camera).count()
+        };
+        let unknowns = self.priors().iter().filter(|sd| **sd > 0.0).count();
         let determined = |value: f64, index: usize, prior: f64| {
-            let sd = covariance.as_ref()?[(index, index)].sqrt();
+            let few = few(images(index / OF_CAMERA), unknowns)?;
+            let sd = (variances.as_ref()?[index] * few).sqrt();
             (sd > 0.0 && sd < DETERMINED * prior).then_some(Measured { value, sd })
         };
         let near = PRIOR_INTERVALS * self.interval_s;
@@ -252,7 +275,6 @@ impl<'a> Setting<'a> {
             };
             let readout_s = determined(clock.readout_s, first, near);
             let fastest = speeds(index).into_iter().fold(0.0, f64::max);
-            let images = groups.iter().flat_map(|(_, group)| &group.images);
             CameraTiming {
                 name: of.name.clone(),
                 readout_s,
@@ -260,7 +282,7 @@ impl<'a> Setting<'a> {
                 shear_px: fastest * readout_s.map_or(0.0, |of| of.value.abs()),
                 offset_s: other(clock.offset_s, 1, near),
                 drift: other(clock.drift, 2, PRIOR_DRIFT),
-                frames: images.filter(|(camera, ..)| *camera == index).count(),
+                frames: images(index),
             }
         });
         Timing {
@@ -269,6 +291,9 @@ impl<'a> Setting<'a> {
             interval_s: self.interval_s,
             speed_px_s: median(speeds(0)).unwrap_or(0.0),
             rms_px: (squares / (2 * raw().count()).max(1) as f64).sqrt(),
+            corner_sd_px: median(raw().map(|(_, variance)| *variance).collect())
+                .unwrap_or(0.0)
+                .sqrt(),
         }
     }
 }
@@ -285,6 +310,17 @@ fn windows(times: &[f64], interval_s: f64) -> Vec<[usize; 2]> {
             .collect::<Vec<_>>()
     };
     runs.flat_map(of_run).collect()
+}
+
+/// Number of frames on each side whose scores are correlated with that of a frame, of all.
+fn lags(frames: usize) -> usize {
+    (frames as f64).cbrt().ceil() as usize
+}
+
+/// The factor of a variance from the scatter of few frames; `None` if there are too few.
+fn few(frames: usize, unknowns: usize) -> Option<f64> {
+    let lost = unknowns * (2 * lags(frames) + 1);
+    (frames > lost).then(|| frames as f64 / (frames - lost) as f64)
 }
 
 /// The scale of residuals: the common variance, and the robust standard deviation of residuals that it whitens.

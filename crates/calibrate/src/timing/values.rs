@@ -30,6 +30,8 @@ pub struct Timing {
     pub speed_px_s: f64,
     /// RMS residual per axis, px.
     pub rms_px: f64,
+    /// Median standard deviation of a detected corner per axis, px; zero if it is not known.
+    pub corner_sd_px: f64,
 }
 
 /// The timing of one camera.
@@ -79,8 +81,12 @@ impl Measured {
 pub enum TimingError {
     /// Too few successive frames show the target.
     #[error(
-        "only {frames} frames of {camera} have neighbours that show the target; at least {needed} are needed: keep the target in \
-         view and move it smoothly, and give all frames"
+        "only {frames} frames{} have neighbours that show the target, of five successive frames each; at least {needed} are \
+         needed: record for ten seconds or more with the target in view, and give all frames",
+        match camera.as_str() {
+            "" => String::new(),
+            camera => format!(" of {camera}"),
+        }
     )]
     TooFew {
         /// Name of the camera.
@@ -89,5 +95,16 @@ pub enum TimingError {
         frames: usize,
         /// The minimum.
         needed: usize,
+    },
+    /// The images do not fit any timing.
+    #[error(
+        "predicted corners are {rms_px:.1} px off (RMS): check that each recording is that of its camera, that the target and the \
+         calibration are right, and that the clocks differ by less than {searched} frames"
+    )]
+    Fit {
+        /// RMS residual per axis, px.
+        rms_px: f64,
+        /// Largest offset that is searched, in frames.
+        searched: i32,
     },
 }

@@ -5,6 +5,7 @@ mod names;
 mod rigs;
 mod robots;
 mod still_calibrated;
+mod timing;
 
 use std::path::Path;
 use std::process::Output;

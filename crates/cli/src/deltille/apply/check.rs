@@ -9,7 +9,7 @@ use anyhow::{Context, bail, ensure};
 
 use crate::deltille::calibrate::filming::FilmArgs;
 use crate::deltille::calibrate::rig::check_own;
-use crate::deltille::calibrate::rig_cameras::{CamerasArgs, Source, check_named, named, topic};
+use crate::deltille::calibrate::rig_cameras::{CamerasArgs, Source, named, topic};
 use crate::deltille::calibrate::sightings::{self, GridArgs, SheetArgs};
 use crate::deltille::calibrate::solving::accuracy;
 use crate::deltille::files::images::RecordingArgs;
@@ -183,15 +183,7 @@ impl Args {
         let (recording, camera) = (photographs.first().cloned(), cameras.clone());
         let of_rig = CamerasArgs { recording, camera, topic: topic.clone(), every, views };
         let names: Vec<&str> = before.cameras.iter().map(|camera| camera.name.as_str()).collect();
-        let sources = of_rig.sources(&names, true)?;
-        let option = if cameras.is_empty() { "--topic" } else { "--camera" };
-        check_named(option, sources.iter().map(|source| source.name.as_str()), &names)?;
-        if let Some(missing) = names.iter().find(|name| !sources.iter().any(|of| of.name == **name))
-        {
-            bail!(
-                "{option}: no images of {missing}; a rig is checked with those of all its cameras"
-            );
-        }
+        let sources = of_rig.of_calibrated(&names)?;
         let of = |source: &Source| {
             let camera = before.cameras.iter().find(|camera| camera.name == source.name);
             camera.map_or(Intrinsics::Unknown(Model::Radtan), of_model)

@@ -7,17 +7,20 @@ use std::process::ExitCode;
 
 use anyhow::{Context, bail, ensure};
 
-use crate::deltille::calibrate::rig_cameras::{
-    CamerasArgs, Source, check_named, follow, named, topic,
-};
+use crate::deltille::calibrate::rig_cameras::{CamerasArgs, Source, follow, named, topic};
 use crate::deltille::calibrate::sightings;
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::{camera_file, target_file};
 use crate::interrupt;
-use crate::output::{self, Overwrite};
+use crate::output::{self, Overwrite, log};
 use deltille::calibrate::{CameraTiming, Estimate, Reference, TimedCamera, Timing, timing};
 use deltille::export::kind::Kind;
 use deltille::export::timing as timing_file;
+use deltille_core::words::shown;
+
+/// Residuals are suspicious beyond this number of standard deviations of corners: blur and paths that are not smooth explain a
+/// few.
+const MISFIT: f64 = 10.0;
 
 /// Arguments of `deltille timing`.
 #[derive(clap::Args)]
@@ -109,7 +112,18 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(path) = &path {
         output::write(path, timing_file::write(&found).as_bytes(), args.overwrite)?;
     }
+    if found.rms_px > MISFIT * found.corner_sd_px && found.corner_sd_px > 0.0 {
+        log!(
+            "warning: residuals ({:.3} px) are many times the standard deviation of the corners ({:.3} px): check the camera, the \
+             target and the time stamps",
+            found.rms_px,
+            found.corner_sd_px
+        );
+    }
     output::print(&describe(&found))?;
+    if let Some(path) = &path {
+        output::print(&format!("wrote {}\n", shown(&path.display().to_string())))?;
+    }
     if interrupt::has_ended_input() {
         return Ok(ExitCode::from(interrupt::exit_code()));
     }
@@ -136,13 +150,7 @@ impl Args {
             self.camera.display()
         );
         let of_rig = CamerasArgs { recording, camera, topic, every: 1, views: None };
-        let mut sources = of_rig.sources(&names, true)?;
-        let option = if self.cameras.is_empty() { "--topic" } else { "--camera" };
-        check_named(option, sources.iter().map(|source| source.name.as_str()), &names)?;
-        if let Some(missing) = names.iter().find(|name| !sources.iter().any(|of| of.name == **name))
-        {
-            bail!("{option}: no images of {missing}; give those of all cameras of the rig");
-        }
+        let mut sources = of_rig.of_calibrated(&names)?;
         sources.sort_by_key(|source| names.iter().position(|name| *name == source.name));
         Ok(sources)
     }
@@ -166,15 +174,16 @@ fn describe(found: &Timing) -> String {
                 "{name}images are taken {ms:.3} ± {sd:.3} ms after those of {first} with the same time stamp{drift}"
             );
         } else if of.name != first {
-            let _ = writeln!(
-                text,
-                "{name}the offset to {first} is undetermined: move the target faster"
-            );
+            let why = match of.frames {
+                0 => format!("no image was taken while {first} took images; the clocks must agree"),
+                _ => MOVE.to_owned(),
+            };
+            let _ = writeln!(text, "{name}the offset to {first} is undetermined: {why}");
         }
     }
     let _ = writeln!(
         text,
-        "{} frames with motion, every {:.2} ms, median speed {:.0} px/s, RMS {:.4} px per axis",
+        "{} frames, every {:.2} ms, median speed {:.0} px/s, RMS {:.4} px per axis",
         found.frames,
         1e3 * found.interval_s,
         found.speed_px_s,
@@ -183,18 +192,21 @@ fn describe(found: &Timing) -> String {
     text
 }
 
+/// What determines timing.
+const MOVE: &str = "move the target faster, and record for ten seconds or more";
+
 /// Describes the shutter of a camera.
 fn readout(of: &CameraTiming) -> String {
     let Some(readout) = of.readout_s else {
-        return "the readout is undetermined: move the target faster".to_owned();
+        return format!("the readout is undetermined: {MOVE}");
     };
     let [ms, sd] = [readout.value, readout.sd].map(|s| 1e3 * s);
     match readout.is_significant() {
         true => format!(
-            "rolling shutter, readout {ms:.3} ± {sd:.3} ms, {:.3} µs per row; corners are displaced by up to {:.1} px",
+            "rolling shutter, readout {ms:.3} ± {sd:.3} ms, {:.3} µs per row; corners are displaced by up to ±{:.1} px",
             1e3 * ms / f64::from(of.height),
             0.5 * of.shear_px
         ),
-        false => format!("no rolling shutter: readout {ms:.3} ± {sd:.3} ms"),
+        false => format!("no significant rolling shutter: readout {ms:.3} ± {sd:.3} ms"),
     }
 }

@@ -88,6 +88,19 @@ impl CamerasArgs {
         Ok(sources)
     }
 
+    /// Returns the cameras of a calibrated rig with these names; each of them needs images.
+    pub fn of_calibrated(&self, names: &[&str]) -> anyhow::Result<Vec<Source>> {
+        let sources = self.sources(names, true)?;
+        let option = if self.camera.is_empty() { "--topic" } else { "--camera" };
+        check_named(option, sources.iter().map(|source| source.name.as_str()), names)?;
+        match names.iter().find(|name| !sources.iter().any(|of| of.name == **name)) {
+            Some(missing) => {
+                bail!("{option}: no images of {missing}; give those of all cameras of the rig")
+            }
+            None => Ok(sources),
+        }
+    }
+
     /// The cameras of one recording.
     fn in_one(&self, recording: &Path, known: &[&str]) -> anyhow::Result<Vec<Source>> {
         if self.topic.is_empty() {
@@ -186,12 +199,22 @@ pub fn follow(
     limits: &Limits,
 ) -> anyhow::Result<Vec<Given>> {
     let paths: Vec<PathBuf> = sources.iter().map(|source| source.path.clone()).collect();
+    for Source { option, path, .. } in sources {
+        ensure!(path.exists(), "{option}: {}: no such file or folder", path.display());
+    }
     if !filming::are_images(&paths)? {
         let given = sources.iter().map(|source| {
             let given = sightings::given(std::slice::from_ref(&source.path), limits);
             given.with_context(|| source.option.clone())
         });
         return given.collect();
+    }
+    if let Some(source) = sources.iter().find(|source| !is_recording(&source.path)) {
+        bail!(
+            "{}: {}: photographs have no time stamps; give a video or a recording",
+            source.option,
+            source.path.display()
+        );
     }
     // Only a selection of frames depends on the intrinsics.
     let intrinsics = Intrinsics::Unknown(Model::Radtan);
@@ -207,7 +230,7 @@ pub fn follow(
 impl Source {
     /// The images of a single camera.
     pub fn alone(path: PathBuf, topic: Option<String>) -> Self {
-        Self { name: String::new(), option: path.display().to_string(), path, topic }
+        Self { name: String::new(), option: "RECORDING".to_owned(), path, topic }
     }
 
     /// Lists the images of the camera. Opens a recording, so that a wrong topic is reported before the first frame is read.

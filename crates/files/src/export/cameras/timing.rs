@@ -16,6 +16,7 @@ struct TimingFile<'a> {
     interval_s: f64,
     speed_px_s: f64,
     rms_px: f64,
+    corner_sd_px: f64,
 }
 
 #[derive(Serialize)]
@@ -46,6 +47,7 @@ pub fn write(found: &Timing) -> String {
         interval_s: found.interval_s,
         speed_px_s: found.speed_px_s,
         rms_px: found.rms_px,
+        corner_sd_px: found.corner_sd_px,
     };
     json::to_text(&file, 3)
 }
