@@ -37,6 +37,9 @@ const SEARCHED: i32 = 8;
 /// Largest RMS residual, relative to the longer side of the image: as in a check of a camera.
 const FITS: f64 = 0.005;
 
+/// Smallest motion from frame to frame, in standard deviations of a corner: below, velocities are mostly noise.
+const MOVES: f64 = 10.0;
+
 /// The ratio of the median of the length of a two-dimensional normal vector to its standard deviation per axis.
 const MEDIAN_LENGTH: f64 = 1.177;
 
@@ -261,9 +264,13 @@ impl<'a> Setting<'a> {
             let images = groups.iter().flat_map(|(_, group)| &group.images);
             images.filter(|(of, ..)| *of == camera).count()
         };
+        let speed_px_s = median(speeds(0)).unwrap_or(0.0);
+        let variance = median(raw().map(|(_, variance)| *variance).collect());
+        let corner_sd_px = variance.unwrap_or(0.0).sqrt();
+        let moves = speed_px_s * self.interval_s > MOVES * corner_sd_px;
         let unknowns = self.priors().iter().filter(|sd| **sd > 0.0).count();
         let determined = |value: f64, index: usize, prior: f64| {
-            let few = few(images(index / OF_CAMERA), unknowns)?;
+            let few = few(images(index / OF_CAMERA), unknowns).filter(|_| moves)?;
             let sd = (variances.as_ref()?[index] * few).sqrt();
             (sd > 0.0 && sd < DETERMINED * prior).then_some(Measured { value, sd })
         };
@@ -289,11 +296,9 @@ impl<'a> Setting<'a> {
             cameras: cameras.collect(),
             frames: groups.len(),
             interval_s: self.interval_s,
-            speed_px_s: median(speeds(0)).unwrap_or(0.0),
+            speed_px_s,
             rms_px: (squares / (2 * raw().count()).max(1) as f64).sqrt(),
-            corner_sd_px: median(raw().map(|(_, variance)| *variance).collect())
-                .unwrap_or(0.0)
-                .sqrt(),
+            corner_sd_px,
         }
     }
 }
