@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, ensure};
 
 use crate::deltille::calibrate::filming::FilmArgs;
 use crate::deltille::calibrate::rig::check_own;
-use crate::deltille::calibrate::rig_cameras::{CamerasArgs, Source, named, topic};
+use crate::deltille::calibrate::rig_cameras::{CamerasArgs, Source, named, topic, topic_of_one};
 use crate::deltille::calibrate::sightings::{self, GridArgs, SheetArgs};
 use crate::deltille::calibrate::solving::accuracy;
 use crate::deltille::files::images::RecordingArgs;
@@ -169,11 +169,7 @@ impl Args {
         let Self { photographs, cameras, topic, every, views, .. } = self;
         let (every, views, assume) = (*every, *views, self.assume_target);
         if let [camera] = before.cameras.as_slice() {
-            let topic = match topic.as_slice() {
-                [] => None,
-                [(None, topic)] => Some(topic.clone()),
-                _ => bail!("--topic: one camera has one topic, without a name"),
-            };
+            let topic = topic_of_one(topic)?;
             let film = FilmArgs { recording: RecordingArgs { topic, every }, views };
             let read =
                 sightings::seen(photographs, &film, &of_model(camera), reference, limits, assume)?;

@@ -7,7 +7,9 @@ use std::process::ExitCode;
 
 use anyhow::{Context, bail, ensure};
 
-use crate::deltille::calibrate::rig_cameras::{CamerasArgs, Source, follow, named, topic};
+use crate::deltille::calibrate::rig_cameras::{
+    CamerasArgs, Source, follow, named, topic, topic_of_one,
+};
 use crate::deltille::calibrate::sightings;
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::{camera_file, target_file};
@@ -137,11 +139,7 @@ impl Args {
         let (recording, camera, topic) =
             (self.recording.clone(), self.cameras.clone(), self.topic.clone());
         if let ([_], Some(path)) = (names.as_slice(), &recording) {
-            let topic = match topic.as_slice() {
-                [] => None,
-                [(None, topic)] => Some(topic.clone()),
-                _ => bail!("--topic: one camera has one topic, without a name"),
-            };
+            let topic = topic_of_one(&topic)?;
             return Ok(vec![Source::alone(path.clone(), topic)]);
         }
         ensure!(

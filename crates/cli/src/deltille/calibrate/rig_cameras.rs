@@ -173,11 +173,7 @@ impl CamerasArgs {
                 ("--every", self.every > 1),
                 ("--views", views),
             ])?;
-            let given = sources.iter().map(|source| {
-                let given = sightings::given(std::slice::from_ref(&source.path), limits);
-                given.with_context(|| source.option.clone())
-            });
-            return given.collect();
+            return detections(sources, limits);
         }
         let cameras = sources.iter().zip(intrinsics);
         let cameras = cameras.map(|(source, intrinsics)| {
@@ -192,6 +188,24 @@ impl CamerasArgs {
     }
 }
 
+/// Reads the detections of each camera.
+fn detections(sources: &[Source], limits: &Limits) -> anyhow::Result<Vec<Given>> {
+    let given = sources.iter().map(|source| {
+        let given = sightings::given(std::slice::from_ref(&source.path), limits);
+        given.with_context(|| source.option.clone())
+    });
+    given.collect()
+}
+
+/// Returns the topic of a single camera, which has no name.
+pub fn topic_of_one(given: &[(Option<String>, String)]) -> anyhow::Result<Option<String>> {
+    match given {
+        [] => Ok(None),
+        [(None, topic)] => Ok(Some(topic.clone())),
+        _ => bail!("--topic: one camera has one topic, without a name"),
+    }
+}
+
 /// Follows the target through all images of each camera, or reads its detections. Nothing is selected.
 pub fn follow(
     sources: &[Source],
@@ -203,11 +217,7 @@ pub fn follow(
         ensure!(path.exists(), "{option}: {}: no such file or folder", path.display());
     }
     if !filming::are_images(&paths)? {
-        let given = sources.iter().map(|source| {
-            let given = sightings::given(std::slice::from_ref(&source.path), limits);
-            given.with_context(|| source.option.clone())
-        });
-        return given.collect();
+        return detections(sources, limits);
     }
     if let Some(source) = sources.iter().find(|source| !is_recording(&source.path)) {
         bail!(
@@ -222,8 +232,8 @@ pub fn follow(
         .iter()
         .map(|source| source.camera(&intrinsics, limits).with_context(|| source.option.clone()));
     let cameras = cameras.collect::<anyhow::Result<_>>()?;
-    let detections = Film { cameras, every: 1, views: None, limits }.follow(reference)?;
-    let given = detections.into_iter().zip(&paths);
+    let found = Film { cameras, every: 1, views: None, limits }.follow(reference)?;
+    let given = found.into_iter().zip(&paths);
     Ok(given.map(|(detections, path)| Given::of_images(detections, path)).collect())
 }
 
