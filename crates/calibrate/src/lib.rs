@@ -16,6 +16,7 @@
 //! 9. `check` tests whether a calibrated camera still agrees with a few new views.
 //! 10. `hand_eye` locates a camera and a board on a robot.
 //! 11. `timing` estimates rolling shutters and the clocks of a rig from a moving target.
+//! 12. `accept` measures known lengths, with their uncertainties, against a limit.
 //!
 //! `adjusted` runs 4 to 7 on all views. `solve` wraps it and holds out frames; `automatic` selects
 //! a model with `solve`; `located` computes the pose of a target. `compare` and `next_view` read
@@ -37,6 +38,7 @@
 //! A small change of a pose is (ω, τ): exp(ω) multiplies the rotation from the left, in the frame that the pose maps
 //! to, and τ is added to the translation. Standard deviations of poses are those of ω (rad) and τ (mm).
 
+mod accept;
 mod adjust;
 mod adjusted;
 mod automatic;
@@ -61,6 +63,9 @@ mod start;
 mod timing;
 mod uncertainty;
 
+pub use accept::acceptance::{Acceptance, Budget, Conformity, LengthError, Probing};
+pub use accept::request::{AcceptanceRequest, CornerLabel, KnownLength, Limit, Temperature};
+pub use accept::run::AcceptanceError;
 pub use adjust::finding::{Finding, Moved, OutlierPattern};
 pub use adjust::lack_of_fit::LackOfFit;
 pub use automatic::Candidate;

@@ -56,9 +56,14 @@ impl MappedCorner {
 impl CornerMap {
     /// All corners that the blocks observe, with zero offsets and the initial prior.
     pub(crate) fn flat(blocks: &[Block]) -> Self {
+        Self::of(blocks.iter().map(|block| (block.panel, &block.observations[..])))
+    }
+
+    /// All corners of these panels, with zero offsets and the initial prior.
+    pub(crate) fn of<'a>(seen: impl Iterator<Item = (PanelRef, &'a [Observation])>) -> Self {
         let mut corners: BTreeMap<Label, MappedCorner> = BTreeMap::new();
-        for &Block { panel, ref observations, .. } in blocks {
-            for &Observation { row, col, panel_mm, .. } in observations.iter() {
+        for (panel, observations) in seen {
+            for &Observation { row, col, panel_mm, .. } in observations {
                 let corner = MappedCorner { panel, row, col, panel_mm };
                 corners.entry(corner.label()).or_insert(corner);
             }

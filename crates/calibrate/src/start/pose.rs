@@ -54,7 +54,7 @@ pub(crate) fn estimate_pose(
 }
 
 /// The median residual of the corners of panels, px; infinite if the camera cannot image most of them.
-pub(super) fn median_off_px(
+pub(crate) fn median_off_px(
     camera: &Camera,
     panels: &[Pose],
     sightings: &[Sighting],
