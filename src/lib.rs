@@ -40,7 +40,7 @@ pub use deltille_files::logo;
 pub use deltille_files::report;
 #[cfg(feature = "files")]
 pub use deltille_files::{
-    SheetUseError, camera_file, clock, export, limits, robot_poses, target_file,
+    SheetUseError, camera_file, clock, export, known_lengths, limits, robot_poses, target_file,
 };
 #[cfg(feature = "photographs")]
 pub use deltille_files::{photograph, remap};

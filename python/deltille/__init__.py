@@ -10,6 +10,7 @@ right-handed with x right, y up on the print, z towards the viewer; the frame of
 """
 
 from ._core import (
+    Acceptance,
     AprilGrid,
     Board,
     CalibratedCamera,
@@ -51,6 +52,7 @@ from ._core import (
     Verdict,
     View,
     __version__,
+    accept,
     calibrate,
     check,
     compare,
@@ -90,6 +92,7 @@ Detection.plot = _plot  # type: ignore[method-assign]
 Detection._repr_html_ = _repr_html  # type: ignore[method-assign]
 
 __all__ = [
+    "Acceptance",
     "AprilGrid",
     "ArgumentError",
     "Board",
@@ -145,6 +148,7 @@ __all__ = [
     "VerifyError",
     "View",
     "__version__",
+    "accept",
     "calibrate",
     "check",
     "compare",

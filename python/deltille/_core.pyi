@@ -29,6 +29,7 @@ from .typing import (
 )
 
 __all__ = [
+    "Acceptance",
     "AprilGrid",
     "Board",
     "CalibratedCamera",
@@ -81,6 +82,7 @@ __all__ = [
     "_run",
     "_tables",
     "_target",
+    "accept",
     "calibrate",
     "check",
     "compare",
@@ -1195,6 +1197,49 @@ def check(
     assume_target: bool = False,
     board_accuracy_mm: float | None = None,
 ) -> Check: ...
+@final
+class Acceptance:
+    @property
+    def verdict(self) -> Literal["conforms", "fails", "undecided"] | None: ...
+    @property
+    def frames(self) -> int: ...
+    @property
+    def known_mm(self) -> NDArray[numpy.float64]: ...
+    @property
+    def error_mm(self) -> NDArray[numpy.float64]: ...
+    @property
+    def combined_mm(self) -> NDArray[numpy.float64]: ...
+    @property
+    def expanded_mm(self) -> NDArray[numpy.float64]: ...
+    @property
+    def probing_mm(self) -> float: ...
+    @property
+    def probing_rms_mm(self) -> float: ...
+    @property
+    def took_part(self) -> list[str]: ...
+    def to_json(self) -> str: ...
+    def certificate(self, calibration: str, target: str) -> str: ...
+
+_End = tuple[int, int] | tuple[int, int, int]
+
+def accept(
+    calibration: CalibratedCamera | Rig,
+    detections: Iterable[Detection | Failure] | Mapping[str, Sequence[Detection | Failure]],
+    target: Target | Sequence[Target] | None = None,
+    *,
+    lengths: Sequence[tuple[_End, _End, float, float]] | None = None,
+    limit_mm: float | None = None,
+    limit_per_length: float = 0.0,
+    temperature_c: tuple[float, float] | None = None,
+    expansion_ppm: tuple[float, float] | None = None,
+    grid: Tiling | None = None,
+    rows: int | None = None,
+    cols: int | None = None,
+    edge_mm: float | None = None,
+    print_scale: ArrayLike | None = None,
+    assume_target: bool = False,
+    board_accuracy_mm: float | None = None,
+) -> Acceptance: ...
 @final
 class HandEye:
     @property

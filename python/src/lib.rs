@@ -51,6 +51,8 @@ mod _core {
     use super::*;
 
     #[pymodule_export]
+    use super::calibrate::accepting::{Acceptance, accept_of};
+    #[pymodule_export]
     use super::calibrate::calibrated_camera::{_part, CalibratedCamera};
     #[pymodule_export]
     use super::calibrate::calibration::{_calibration, _rig, Calibration, Rig};

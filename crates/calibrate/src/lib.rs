@@ -64,7 +64,9 @@ mod timing;
 mod uncertainty;
 
 pub use accept::acceptance::{Acceptance, Budget, Conformity, LengthError, Probing};
-pub use accept::request::{AcceptanceRequest, CornerLabel, KnownLength, Limit, Temperature};
+pub use accept::request::{
+    AcceptanceRequest, CornerLabel, KnownLength, Limit, NoCorner, Temperature,
+};
 pub use accept::run::AcceptanceError;
 pub use adjust::finding::{Finding, Moved, OutlierPattern};
 pub use adjust::lack_of_fit::LackOfFit;

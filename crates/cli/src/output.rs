@@ -33,6 +33,17 @@ pub fn file(output: &Path, stem: &str, extension: &str) -> anyhow::Result<PathBu
     }
 }
 
+/// Returns the path of the page of `--report`: a file that ends in .html, or a folder. Rejects unusable paths before the work
+/// starts.
+pub fn page(page: &Path, stem: &str, overwrite: Overwrite) -> anyhow::Result<PathBuf> {
+    let is_page = page.is_dir() || page.extension().is_some_and(|end| end == "html");
+    ensure!(is_page, "--report: {} must end in .html, or be a folder", page.display());
+    let page = file(page, stem, "html")?;
+    check_writable("--report", &page)?;
+    overwrite.check(&page, &Kind::own_page()).context("--report")?;
+    Ok(page)
+}
+
 /// Checks, before hours of work and without leaving a trace, whether a file can be written.
 pub fn check_writable(option: &str, path: &Path) -> anyhow::Result<()> {
     let context = || format!("{option}: cannot write {}", path.display());

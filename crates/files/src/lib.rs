@@ -9,6 +9,7 @@
 //! | [`family_file`] | families by name or from their files |
 //! | [`target_file`] | targets from their files, with their families |
 //! | [`camera_file`] | cameras from their files |
+//! | [`known_lengths`] | lengths on a target that were measured by other means |
 //! | [`robot_poses`] | poses of a robot from their files |
 //! | [`photograph`] | photographs in common formats as grey images |
 //! | `exif_notes` | the camera in the EXIF metadata of a photograph |
@@ -16,7 +17,7 @@
 //! | `known_print` | known properties of a print (scale, bend, panel poses), applied to views |
 //! | [`logo`] | logos from SVG |
 //! | [`export`] | artwork, targets and results to files and back, one module for each format |
-//! | [`report`] | a calibration as an HTML page |
+//! | [`report`] | a calibration or an acceptance test as an HTML page |
 
 pub mod camera_file;
 pub mod clock;
@@ -24,6 +25,7 @@ pub mod clock;
 mod exif_notes;
 pub mod export;
 pub mod family_file;
+pub mod known_lengths;
 mod known_print;
 pub mod limits;
 #[cfg(feature = "logo")]

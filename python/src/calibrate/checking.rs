@@ -4,6 +4,7 @@ use deltille::calibrate::{
     self, Calibration, CameraEstimate, CameraViews, Estimate, Model, Reference, views,
 };
 use deltille::export::check;
+use deltille::targets::Target;
 use pyo3::prelude::*;
 use pyo3::types::PyMapping;
 
@@ -224,9 +225,51 @@ pub fn check_of(
     assume_target: bool,
     board_accuracy_mm: Option<f64>,
 ) -> PyResult<Check> {
+    let of_board = OfBoard {
+        target,
+        grid,
+        rows,
+        cols,
+        edge_mm,
+        print_scale,
+        assume_target,
+        board_accuracy_mm,
+    };
+    let (before, views, _) = new_views(py, calibration, detections, of_board)?;
+    unlocked(py, move || Check(views.check(&before)))
+}
+
+/// The target of new detections, as keywords.
+pub(super) struct OfBoard<'a, 'py> {
+    pub target: Option<Targets>,
+    pub grid: Option<&'a str>,
+    pub rows: Option<i64>,
+    pub cols: Option<i64>,
+    pub edge_mm: Option<f64>,
+    pub print_scale: Option<&'a Bound<'py, PyAny>>,
+    pub assume_target: bool,
+    pub board_accuracy_mm: Option<f64>,
+}
+
+/// The earlier calibration, a calibration with the views of new detections, and their target.
+pub(super) fn new_views(
+    py: Python<'_>,
+    calibration: &Bound<'_, PyAny>,
+    detections: &Bound<'_, PyAny>,
+    of_board: OfBoard<'_, '_>,
+) -> PyResult<(Estimate, Calibration, Target)> {
+    let OfBoard {
+        mut target,
+        grid,
+        rows,
+        cols,
+        edge_mm,
+        print_scale,
+        assume_target,
+        board_accuracy_mm,
+    } = of_board;
     let how = How::of("huber", "covariance", None, None, print_scale, board_accuracy_mm)?;
     let before = before(calibration)?;
-    let mut target = target;
     let given = given(py, &before, detections, grid.is_some(), &mut target)?;
     let seen = Seen::of(target, grid, sides(rows, cols)?, edge_mm)?;
     let wrong = |what: &str| raised::CalibrationError::new_err(what.to_owned());
@@ -269,7 +312,8 @@ pub fn check_of(
         sheet.put_on(reference.targets().first(), &mut of_camera).raise(errors::calibration)?;
         checked = checked.with(CameraViews::new(&camera.name, of_camera, Model::Radtan));
     }
-    unlocked(py, move || Check(checked.check(&before)))
+    let target = reference.targets().first().cloned().ok_or_else(|| wrong("pass one target"))?;
+    Ok((before, checked, target))
 }
 
 /// The earlier calibration; without uncertainties if it failed.
@@ -278,7 +322,7 @@ fn before(given: &Bound<'_, PyAny>) -> PyResult<Estimate> {
         let mut before = Estimate::default();
         before.cameras = cameras;
         before.joint = solved.estimate.joint.clone();
-        before.common_px = solved.estimate.common_px;
+        (before.common_px, before.sigma) = (solved.estimate.common_px, solved.estimate.sigma);
         before.calibrated_with = solved.estimate.calibrated_with.clone();
         if solved.said().iter().any(|(_, is_failure)| *is_failure) {
             before.cameras.iter_mut().for_each(CameraEstimate::forget_uncertainties);

@@ -10,8 +10,10 @@
 //! 5. `next_view` proposes the next view.
 //! 6. `comparison` tests whether two calibrations differ, and estimates the pose of a target.
 //! 7. `checking` tests whether cameras are still as calibrated, from a few new detections.
-//! 8. `robots` locates a camera and a board on a robot.
+//! 8. `accepting` measures known lengths, with the arguments of `checking`.
+//! 9. `robots` locates a camera and a board on a robot.
 
+pub mod accepting;
 pub mod calibrated_camera;
 pub mod calibration;
 pub mod checking;

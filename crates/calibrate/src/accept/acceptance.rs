@@ -3,9 +3,6 @@
 use super::request::{CornerLabel, Limit};
 use deltille_core::statistics::f_p_value;
 
-/// The level of confidence of expanded uncertainties.
-pub(crate) const CONFIDENCE: f64 = 0.95;
-
 /// The result of an acceptance test.
 ///
 /// A rig measures corners by triangulation, with the scale of its calibration. One camera measures them in the plane of their
@@ -100,6 +97,9 @@ impl Conformity {
 }
 
 impl Acceptance {
+    /// The level of confidence of expanded uncertainties.
+    pub const CONFIDENCE: f64 = 0.95;
+
     /// The length with the largest error.
     pub fn largest(&self) -> Option<&LengthError> {
         let size = |of: &&LengthError| of.error_mm().abs();
@@ -174,7 +174,7 @@ fn coverage_factor(freedom: f64) -> f64 {
     let [mut low, mut high] = [1.9, 13.0];
     for _ in 0..40 {
         let t: f64 = 0.5 * (low + high);
-        let is_small = f_p_value(t * t, 1.0, freedom) > 1.0 - CONFIDENCE;
+        let is_small = f_p_value(t * t, 1.0, freedom) > 1.0 - Acceptance::CONFIDENCE;
         *(if is_small { &mut low } else { &mut high }) = t;
     }
     high

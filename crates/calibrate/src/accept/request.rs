@@ -1,6 +1,7 @@
 //! What an acceptance test compares with.
 
 use crate::input::panel::PanelRef;
+use deltille_core::targets::Target;
 
 /// A corner of the target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -57,6 +58,43 @@ pub struct AcceptanceRequest {
     pub temperature: Option<Temperature>,
 }
 
+/// A corner that a target does not have.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoCorner {
+    /// The target has several panels, and none was named.
+    #[error("the target has several panels: name that of each end")]
+    Panel,
+    /// No panel of the target has this corner.
+    #[error("the target has no corner {row}, {col}{}", panel.map_or(String::new(), |id| format!(" on panel {id}")))]
+    Corner {
+        /// Id of the panel, if it was named.
+        panel: Option<u32>,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+    },
+}
+
+impl CornerLabel {
+    /// The corner of a target; `panel` is the id of its panel, which may be omitted if there is only one.
+    ///
+    /// # Errors
+    /// Returns an error if the target has no such corner.
+    pub fn on(target: &Target, panel: Option<u32>, row: i32, col: i32) -> Result<Self, NoCorner> {
+        if panel.is_none() && target.panels.len() > 1 {
+            return Err(NoCorner::Panel);
+        }
+        let panels = target.panels.iter().enumerate();
+        let mut panels = panels.filter(|(_, of)| panel.is_none_or(|id| id == of.id));
+        let found = panels
+            .find(|(_, of)| of.corners.iter().any(|corner| (corner.row, corner.col) == (row, col)));
+        let (index, of) = found.ok_or(NoCorner::Corner { panel, row, col })?;
+        Ok(Self { panel: PanelRef::new(index, of.id), row, col })
+    }
+}
+
 impl Limit {
     /// The largest permitted error of a length, mm.
     pub fn of(&self, length_mm: f64) -> f64 {
@@ -65,6 +103,9 @@ impl Limit {
 }
 
 impl Temperature {
+    /// The reference temperature of lengths (ISO 1), °C.
+    pub const REFERENCE_C: f64 = 20.0;
+
     /// The relative expansion of the target, and its standard uncertainty.
     pub(super) fn strain(&self) -> (f64, f64) {
         let strain = self.expansion_per_k * self.above_reference_k;

@@ -33,6 +33,11 @@ pub enum AcceptanceError {
          ten views, and with another model than spline"
     )]
     Uncertainty,
+    /// One camera takes the scale from the target.
+    #[error(
+        "one camera takes the scale from the target, so that its expansion has no effect: omit the temperature and the expansion"
+    )]
+    Temperature,
     /// All views took part in the calibration.
     #[error("all {views} views took part in the calibration: take other photographs")]
     TookPart {
@@ -108,13 +113,16 @@ impl Calibration {
         before: &Estimate,
         request: &AcceptanceRequest,
     ) -> Result<Acceptance, AcceptanceError> {
+        let is_triangulated = before.cameras.len() > 1;
+        if request.temperature.is_some() && !is_triangulated {
+            return Err(AcceptanceError::Temperature);
+        }
         let (views, took_part) = self.new_views(before);
         let count = views.values().map(Vec::len).sum::<usize>();
         if count == 0 && !took_part.is_empty() {
             return Err(AcceptanceError::TookPart { views: took_part.len() });
         }
         let test = self.test(before, request).ok_or(AcceptanceError::Uncertainty)?;
-        let is_triangulated = before.cameras.len() > 1;
         let mut found = Acceptance {
             is_triangulated,
             lengths: Vec::new(),
@@ -283,10 +291,7 @@ impl Test<'_> {
             true => described(),
             false => known.collect(),
         };
-        // One camera takes the scale from the target, so that its expansion has no effect.
-        let is_triangulated = self.cameras.len() > 1;
-        let temperature = self.request.temperature.filter(|_| is_triangulated);
-        let (strain, strain_sd) = temperature.map_or((0.0, 0.0), |of| of.strain());
+        let (strain, strain_sd) = self.request.temperature.map_or((0.0, 0.0), |of| of.strain());
         let of = lengths.into_iter().map(|(ends, length_mm, sd_mm)| {
             let by = measured.sensitivity(ends, sd_mm.is_some());
             let of_target = self.target.variance(&by.by_target);

@@ -184,8 +184,11 @@ fn a_rig_sees_a_board_that_is_too_large_and_a_single_camera_does_not() {
             expansion_sd_per_k: 0.0,
         });
         let request = AcceptanceRequest { limit, temperature, ..Default::default() };
-        let warm = accepted(&rig, &board, &estimate, &request, &mut random);
-        assert_eq!(warm.verdict(), Some(Conformity::Conforms));
+        let warm = calibration(rig.views(&board, 6, &mut random)).accept(&estimate, &request);
+        match cameras {
+            1 => assert_eq!(warm, Err(AcceptanceError::Temperature)),
+            _ => assert_eq!(warm.unwrap().verdict(), Some(Conformity::Conforms)),
+        }
     }
 }
 

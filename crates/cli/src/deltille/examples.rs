@@ -90,6 +90,10 @@ pub const CHECK: &str = "Examples:
   deltille check rig.json --camera left=today/left --camera right=today/right --target desk/desk.json
   deltille check rig.json today.mcap --topic /left/image_raw --topic /right/image_raw --target desk/desk.json";
 
+pub const ACCEPT: &str = "Examples:
+  deltille accept camera.json today/*.jpg --target desk/desk.json --limit 0.1mm --report certificate.html
+  deltille accept rig.json --camera left=today/left --camera right=today/right --target glass/glass.json --limit 0.05mm+L/5000 --lengths measured.csv --temperature 23.5±0.5 --expansion 8.5±0.3 -o acceptance.json";
+
 pub const POSE: &str = "Examples:
   deltille pose photos --target desk/desk.json --camera camera.yaml
   deltille pose photo.png --target desk/desk.json --camera camera.yaml --all-images";

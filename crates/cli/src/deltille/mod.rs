@@ -23,7 +23,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use self::apply::{check, hand_eye, pose, timing, undistort};
+use self::apply::{accept, check, hand_eye, pose, timing, undistort};
 use self::calibrate::{compare, guide, one_camera, rig};
 use self::make::{aprilgrid, board, charuco, circles, plan, solid, verify};
 use self::measure::{bench, experiment};
@@ -126,6 +126,13 @@ enum Command {
     /// missing (3). The camera file must contain uncertainties: the .json of `deltille calibrate` or `deltille rig`.
     #[command(after_help = examples::CHECK)]
     Check(check::Args),
+    /// Measure known lengths with a camera or a rig, and judge their errors against a limit
+    ///
+    /// The photographs must not be those of the calibration. A rig triangulates corners. One camera measures them in the plane of
+    /// the target and takes the scale from it. Exit code: 0 if all errors are within the limit by more than their expanded
+    /// uncertainty (95 %), 1 if an error exceeds it by more, 3 if the uncertainty is too large to decide.
+    #[command(after_help = examples::ACCEPT)]
+    Accept(Box<accept::Args>),
     /// Estimate the pose of a target in photographs from a calibrated camera
     #[command(after_help = examples::POSE)]
     Pose(pose::Args),
@@ -165,6 +172,7 @@ pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
     match deltille.command {
         Command::Bench(args) => bench::run(args),
         Command::Calibrate(args) => one_camera::run(args),
+        Command::Accept(args) => accept::run(*args),
         Command::Check(args) => check::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Guide(args) => guide::run(*args),

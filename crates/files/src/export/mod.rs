@@ -21,8 +21,8 @@ pub use cameras::format::{
     CAMERA_FORMATS, CameraFormat, Overlaps, Placed, RIG_FORMATS, RigFile, RigFormat, Written,
 };
 pub use cameras::{
-    calibration, camera, check, comparison, covariance, hand_eye, next_view, pose, rig, saved,
-    sheet, timing, truth, undistortion,
+    acceptance, calibration, camera, check, comparison, covariance, hand_eye, next_view, pose, rig,
+    saved, sheet, timing, truth, undistortion,
 };
 pub use detections::format::{DETECTION_FORMATS, DetectionFormat};
 #[cfg(feature = "overlay")]

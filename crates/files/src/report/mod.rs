@@ -10,11 +10,14 @@
 //! 5. `sections` puts tables and plots under headlines, with the elements of `html`.
 //! 6. `page` assembles the verdict, the advice and the sections of each camera.
 //!
+//! `certificate` is the page of an acceptance test, which has its own style and one plot.
+//!
 //! A module imports only from those above it in this list, or from `html`; no imports are circular.
 //!
 //! Limits: the tilt of a view is shown for planar targets only, because the faces of a solid have different tilts.
 
 mod advice;
+mod certificate;
 mod content;
 mod html;
 mod measures;
@@ -24,6 +27,7 @@ mod plots;
 mod sections;
 
 pub use advice::{Advice, Weight, advice};
+pub use certificate::Certificate;
 pub use content::Report;
 pub use measures::survey::{Survey, SurveyedView};
 pub use pictures::sample::Sample;

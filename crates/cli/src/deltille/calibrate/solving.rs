@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::str::FromStr;
 
-use anyhow::{Context, anyhow, bail, ensure};
+use anyhow::{anyhow, bail};
 use clap::ValueEnum;
 
 use super::constraints::ConstraintArgs;
@@ -22,7 +22,6 @@ use deltille::calibrate::{
 use deltille::camera::Camera;
 use deltille::export::calibration::{Print, Residuals};
 use deltille::export::camera::FormatError;
-use deltille::export::kind::Kind;
 use deltille::layout::Printing;
 use deltille::report::target_map_svg;
 use deltille::targets::{self, parse_length_mm};
@@ -283,13 +282,8 @@ impl SolveArgs {
     /// Returns the path of the report (`<stem>-report.html` in a folder). Rejects unusable paths before the work
     /// starts.
     pub fn page(&self, stem: &str, overwrite: Overwrite) -> anyhow::Result<Option<PathBuf>> {
-        let Some(page) = &self.report else { return Ok(None) };
-        let is_page = page.is_dir() || page.extension().is_some_and(|end| end == "html");
-        ensure!(is_page, "--report: {} must end in .html, or be a folder", page.display());
-        let page = output::file(page, &format!("{stem}-report"), "html")?;
-        output::check_writable("--report", &page)?;
-        overwrite.check(&page, &Kind::own_page()).context("--report")?;
-        Ok(Some(page))
+        let stem = format!("{stem}-report");
+        self.report.as_deref().map(|page| output::page(page, &stem, overwrite)).transpose()
     }
 }
 

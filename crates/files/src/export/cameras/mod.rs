@@ -2,8 +2,9 @@
 //!
 //! [`calibration`] and [`rig`] write estimates with the records of `estimate`, `constraint`, `finding` and `motion`. [`saved`] reads them back;
 //! [`sheet`] reads only their data about the print. [`camera`] writes the formats of other programs, and `format` is the table of
-//! these formats. [`covariance`] writes the covariance of a calibration. [`check`], [`comparison`], [`hand_eye`], [`pose`], [`next_view`], [`timing`], [`undistortion`] and [`truth`] are the results of other commands.
+//! these formats. [`covariance`] writes the covariance of a calibration. [`acceptance`], [`check`], [`comparison`], [`hand_eye`], [`pose`], [`next_view`], [`timing`], [`undistortion`] and [`truth`] are the results of other commands.
 
+pub mod acceptance;
 pub mod calibration;
 pub mod camera;
 pub mod check;

@@ -1,0 +1,131 @@
+//! The result of `deltille accept` as JSON, schema `deltille/acceptance/1`.
+
+use serde::Serialize;
+
+use deltille_calibrate::{Acceptance, CornerLabel, LengthError, Limit};
+use deltille_core::json;
+
+/// Schema and version that this crate writes.
+pub const SCHEMA: &str = "deltille/acceptance/1";
+
+#[derive(Serialize)]
+struct AcceptanceFile<'a> {
+    schema: &'static str,
+    /// `null` without a limit.
+    verdict: Option<&'static str>,
+    limit: Option<LimitRecord>,
+    method: &'static str,
+    confidence: f64,
+    frames: usize,
+    largest: Option<LengthRecord<'a>>,
+    lengths_within_uncertainty: usize,
+    probing: ProbingRecord<'a>,
+    took_part: &'a [String],
+    lengths: Vec<LengthRecord<'a>>,
+}
+
+#[derive(Serialize)]
+struct LimitRecord {
+    constant_mm: f64,
+    per_length: f64,
+}
+
+#[derive(Serialize)]
+struct ProbingRecord<'a> {
+    largest_mm: f64,
+    #[serde(flatten)]
+    at: Option<PlaceRecord<'a>>,
+    rms_mm: f64,
+    corners: usize,
+}
+
+#[derive(Serialize)]
+struct PlaceRecord<'a> {
+    corner: CornerRecord,
+    frame: &'a str,
+}
+
+#[derive(Serialize)]
+struct CornerRecord {
+    panel: u32,
+    row: i32,
+    col: i32,
+}
+
+#[derive(Serialize)]
+struct LengthRecord<'a> {
+    frame: &'a str,
+    from: CornerRecord,
+    to: CornerRecord,
+    known_mm: f64,
+    measured_mm: f64,
+    error_mm: f64,
+    noise_mm: f64,
+    lens_mm: f64,
+    calibration_mm: f64,
+    target_mm: f64,
+    temperature_mm: f64,
+    combined_mm: f64,
+    /// `null` if no part was estimated from few values.
+    freedom: Option<f64>,
+    coverage_factor: f64,
+    expanded_mm: f64,
+    limit_mm: Option<f64>,
+    verdict: Option<&'static str>,
+}
+
+/// The JSON text of a result.
+pub fn write(found: &Acceptance) -> String {
+    let probing = &found.probing;
+    let file = AcceptanceFile {
+        schema: SCHEMA,
+        verdict: found.verdict().map(|of| of.name()),
+        limit: found
+            .limit
+            .map(|Limit { constant_mm, per_length }| LimitRecord { constant_mm, per_length }),
+        method: if found.is_triangulated { "triangulation" } else { "plane" },
+        confidence: Acceptance::CONFIDENCE,
+        frames: found.frames,
+        largest: found.largest().map(|of| length(found, of)),
+        lengths_within_uncertainty: found.within(),
+        probing: ProbingRecord {
+            largest_mm: probing.largest_mm,
+            at: probing
+                .at
+                .as_ref()
+                .map(|(label, frame)| PlaceRecord { corner: corner(label), frame }),
+            rms_mm: probing.rms_mm,
+            corners: probing.corners,
+        },
+        took_part: &found.took_part,
+        lengths: found.lengths.iter().map(|of| length(found, of)).collect(),
+    };
+    json::to_text(&file, 2)
+}
+
+fn corner(of: &CornerLabel) -> CornerRecord {
+    CornerRecord { panel: of.panel.id(), row: of.row, col: of.col }
+}
+
+fn length<'a>(found: &Acceptance, of: &'a LengthError) -> LengthRecord<'a> {
+    let budget = &of.budget;
+    LengthRecord {
+        frame: &of.frame,
+        from: corner(&of.ends[0]),
+        to: corner(&of.ends[1]),
+        known_mm: of.known_mm,
+        measured_mm: of.measured_mm,
+        error_mm: of.error_mm(),
+        noise_mm: budget.noise_mm,
+        lens_mm: budget.lens_mm,
+        calibration_mm: budget.calibration_mm,
+        target_mm: budget.target_mm,
+        temperature_mm: budget.temperature_mm,
+        combined_mm: budget.combined_mm(),
+        freedom: Some(budget.freedom()).filter(|freedom| freedom.is_finite()),
+        coverage_factor: budget.coverage_factor(),
+        expanded_mm: budget.expanded_mm(),
+        limit_mm: found.limit.map(|limit| limit.of(of.known_mm)),
+        verdict: found.conformity(of).map(|of| of.name()),
+    }
+}

@@ -1,0 +1,264 @@
+//! The certificate of an acceptance test: one page of A4.
+
+use std::fmt::Write as _;
+
+use crate::report::html::escaped;
+use crate::report::plots::length_errors;
+use deltille_calibrate::{Acceptance, Conformity, CornerLabel, LengthError, Temperature};
+use deltille_core::words::{counted, places};
+
+const STYLE: &str = include_str!("certificate.css");
+
+/// Number of lengths in the table.
+const ROWS: usize = 6;
+
+/// The contents of a certificate.
+#[derive(Clone, Debug)]
+pub struct Certificate<'a> {
+    /// The file of the calibration.
+    pub calibration: String,
+    /// The target.
+    pub target: String,
+    /// The table of measured lengths; `None` if those of the target's description were measured.
+    pub lengths: Option<String>,
+    /// The temperature of the target, if it was given.
+    pub temperature: Option<Temperature>,
+    /// The result.
+    pub found: &'a Acceptance,
+}
+
+impl Certificate<'_> {
+    /// The page as HTML with an embedded drawing.
+    pub fn html(&self) -> String {
+        let found = self.found;
+        let mut page = format!(
+            "<!DOCTYPE html>\n<!-- deltille {version} -->\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+             <title>Acceptance test – {title}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
+             <h1>Acceptance test of length measurement</h1>\n",
+            version = env!("CARGO_PKG_VERSION"),
+            title = escaped(&self.calibration),
+        );
+        page += &self.head();
+        page += &verdict(found);
+        page += "<h2>Errors of length measurement</h2>";
+        page += &length_errors::plot(found);
+        page += &largest(found);
+        page += "<div class=\"sides\"><section>";
+        page += &found.largest().map_or(String::new(), budget);
+        page += "</section><section>";
+        page += &probing(found);
+        page += &self.method();
+        page += "</section></div>";
+        let _ = write!(
+            page,
+            "<div class=\"sign\"><div>Date</div><div>Tested by</div></div>\n\
+             <p class=\"note\">deltille {}</p>\n</body>\n</html>\n",
+            env!("CARGO_PKG_VERSION")
+        );
+        page
+    }
+
+    /// What was tested, and with what.
+    fn head(&self) -> String {
+        let found = self.found;
+        let frames = match found.is_triangulated {
+            true => counted(found.frames, "set") + " of simultaneous images",
+            false => counted(found.frames, "image"),
+        };
+        let mut rows = vec![
+            ("Calibration", self.calibration.clone()),
+            ("Target", self.target.clone()),
+            ("Images", format!("{frames}, {}", counted(found.probing.corners, "measured corner"))),
+        ];
+        let known = match &self.lengths {
+            Some(file) => format!("{}, known from {file}", counted(found.lengths.len(), "length")),
+            None => {
+                format!("{} between corners of the target", counted(found.lengths.len(), "length"))
+            }
+        };
+        rows.push(("Lengths", known));
+        if let Some(of) = &self.temperature {
+            let text = format!(
+                "{:.1} ± {:.1} K above the reference temperature (1σ), expansion {:.1} ± {:.1} ppm/K",
+                of.above_reference_k,
+                of.sd_k,
+                of.expansion_per_k * 1e6,
+                of.expansion_sd_per_k * 1e6
+            );
+            rows.push(("Temperature", text));
+        }
+        if let Some(limit) = found.limit {
+            let per = match limit.per_length > 0.0 {
+                true => format!(" + L / {:.0}", 1.0 / limit.per_length),
+                false => String::new(),
+            };
+            rows.push(("Limit of the error", format!("{} mm{per}", limit.constant_mm)));
+        }
+        let rows = rows
+            .into_iter()
+            .map(|(name, value)| format!("<tr><th>{name}</th><td>{}</td></tr>", escaped(&value)));
+        format!("<table class=\"head\">{}</table>", rows.collect::<String>())
+    }
+
+    /// How lengths were measured.
+    fn method(&self) -> String {
+        let how = match self.found.is_triangulated {
+            true => {
+                "Corners are triangulated by all cameras that see them. The scale is that of the calibration. The probing error is the \
+             largest distance of a corner from the target after the best rigid fit in each set of images."
+            }
+            false => {
+                "Corners are measured in the plane of their panel, at the pose estimated from the same image. The scale is that of the \
+             target: a common error of scale is not seen. The probing error is the largest distance of a corner from the target."
+            }
+        };
+        let lines = match self.lengths {
+            Some(_) => "",
+            None => {
+                " In each image, up to seven lines in different directions are measured, with up to five lengths each, in the manner of \
+             VDI/VDE 2634 part 1."
+            }
+        };
+        format!(
+            "<h2>Method</h2><p class=\"note\">{how}{lines} Uncertainties follow the GUM; conformity is judged by \
+             ISO 14253-1. The images took no part in the calibration.</p>"
+        )
+    }
+}
+
+/// The judgement, and the largest error.
+fn verdict(found: &Acceptance) -> String {
+    let (class, text) = match found.verdict() {
+        Some(Conformity::Conforms) => (
+            "conforms",
+            "<b>Conforms.</b> All errors are within the limit by more than their expanded uncertainty.",
+        ),
+        Some(Conformity::Fails) => (
+            "fails",
+            "<b>Does not conform.</b> At least one error exceeds the limit by more than its expanded uncertainty.",
+        ),
+        Some(Conformity::Undecided) => (
+            "undecided",
+            "<b>Undecided.</b> The limit is within the expanded uncertainty of at least one error.",
+        ),
+        None => ("none", "<b>Measured.</b> No limit was given."),
+    };
+    let largest = found.largest().map_or(String::new(), |of| {
+        let mm = Places::of(of);
+        format!(
+            " Largest error: {} mm at {:.1} mm, expanded uncertainty {} mm.",
+            mm.signed(of.error_mm()),
+            of.known_mm,
+            mm.text(of.budget.expanded_mm())
+        )
+    });
+    format!("<p class=\"verdict {class}\">{text}{largest}</p>")
+}
+
+/// The lengths with the largest errors.
+fn largest(found: &Acceptance) -> String {
+    let mut lengths: Vec<&LengthError> = found.lengths.iter().collect();
+    lengths.sort_by(|a, b| b.error_mm().abs().total_cmp(&a.error_mm().abs()));
+    let has_panels = lengths.iter().any(|of| of.ends[0].panel != lengths[0].ends[0].panel);
+    let mut text = "<table><tr><th>Largest errors: image</th><th>from – to (row, column)</th><th class=\"number\">known mm</th>\
+                    <th class=\"number\">measured mm</th><th class=\"number\">error mm</th><th class=\"number\">U mm</th>"
+        .to_owned();
+    if found.limit.is_some() {
+        text += "<th class=\"number\">limit mm</th>";
+    }
+    text += "</tr>";
+    for of in lengths.into_iter().take(ROWS) {
+        let mm = Places::of(of);
+        let limit = found.limit.map_or(String::new(), |limit| {
+            format!("<td class=\"number\">{}</td>", mm.text(limit.of(of.known_mm)))
+        });
+        let [from, to] = of.ends.map(|end| corner(&end, has_panels));
+        let _ = write!(
+            text,
+            "<tr><td>{}</td><td>{from} – {to}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>\
+             <td class=\"number\">{}</td><td class=\"number\">{}</td>{limit}</tr>",
+            escaped(&of.frame),
+            mm.text(of.known_mm),
+            mm.text(of.measured_mm),
+            mm.signed(of.error_mm()),
+            mm.text(of.budget.expanded_mm()),
+        );
+    }
+    text += "</table>";
+    let _ = write!(
+        text,
+        "<p class=\"note\">{} of {} are within their expanded uncertainty U (confidence {:.0} %).</p>",
+        found.within(),
+        counted(found.lengths.len(), "error"),
+        100.0 * Acceptance::CONFIDENCE
+    );
+    text
+}
+
+/// The budget of the largest error.
+fn budget(of: &LengthError) -> String {
+    let mm = Places::of(of);
+    let budget = &of.budget;
+    let rows = [
+        ("Noise of the corners", budget.noise_mm),
+        ("Lens model, and other errors of corners", budget.lens_mm),
+        ("Calibrated parameters", budget.calibration_mm),
+        ("Target", budget.target_mm),
+        ("Temperature", budget.temperature_mm),
+    ];
+    let row = |(name, value): (&str, f64)| {
+        format!("<tr><td>{name}</td><td class=\"number\">{}</td></tr>", mm.text(value))
+    };
+    let freedom = match budget.freedom() {
+        many if many > 1000.0 => "> 1000".to_owned(),
+        few => format!("{few:.0}"),
+    };
+    format!(
+        "<h2>Uncertainty of the largest error</h2><table><tr><th>Source</th><th class=\"number\">u mm</th></tr>{}\
+         <tr class=\"total\"><td>Combined u</td><td class=\"number\">{}</td></tr>\
+         <tr class=\"total\"><td>Expanded U, k = {:.2} (ν {freedom})</td><td class=\"number\">{}</td></tr></table>",
+        rows.map(row).concat(),
+        mm.text(budget.combined_mm()),
+        budget.coverage_factor(),
+        mm.text(budget.expanded_mm())
+    )
+}
+
+fn probing(found: &Acceptance) -> String {
+    let probing = &found.probing;
+    let digits = places(probing.rms_mm.max(1e-6)).min(6);
+    let at = probing.at.as_ref().map_or(String::new(), |(label, frame)| {
+        format!(" (corner {} in {})", corner(label, false), escaped(frame))
+    });
+    format!(
+        "<h2>Probing error</h2><p>{:.digits$} mm{at}; rms {:.digits$} mm over {}.</p>",
+        probing.largest_mm,
+        probing.rms_mm,
+        counted(probing.corners, "corner")
+    )
+}
+
+fn corner(of: &CornerLabel, with_panel: bool) -> String {
+    match with_panel {
+        true => format!("{}: {}, {}", of.panel, of.row, of.col),
+        false => format!("{}, {}", of.row, of.col),
+    }
+}
+
+/// Decimal places of lengths in mm, after their uncertainty.
+struct Places(usize);
+
+impl Places {
+    fn of(length: &LengthError) -> Self {
+        Self(places(length.budget.combined_mm().max(1e-6)).min(6))
+    }
+
+    fn text(&self, mm: f64) -> String {
+        format!("{mm:.*}", self.0)
+    }
+
+    fn signed(&self, mm: f64) -> String {
+        format!("{mm:+.*}", self.0).replace('-', "−")
+    }
+}
