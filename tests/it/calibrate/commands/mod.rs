@@ -1,5 +1,6 @@
 //! `deltille calibrate`, `rig` and `pose` on files, and input that cannot be calibrated.
 
+mod accepted;
 mod cameras;
 mod names;
 mod rigs;

@@ -14,12 +14,17 @@ use serde_json::Value;
 use std::path::Path;
 
 /// Views of a camera, tilted by these angles to all sides.
-fn views(target: &Target, camera: &Camera, tilts_rad: &[f64], seed: u64) -> Vec<Detection> {
+pub(super) fn views(
+    target: &Target,
+    camera: &Camera,
+    tilts_rad: &[f64],
+    seed: u64,
+) -> Vec<Detection> {
     beside(target, camera, &Pose::IDENTITY, tilts_rad, seed)
 }
 
 /// The same views of a camera with this pose on the rig.
-fn beside(
+pub(super) fn beside(
     target: &Target,
     camera: &Camera,
     camera_from_rig: &Pose,
@@ -39,7 +44,7 @@ fn beside(
     poses.iter().map(|pose| seen_whole(target, camera, pose, &mut random)).collect()
 }
 
-fn write(at: &Path, name: &str, detections: &[Detection]) {
+pub(super) fn write(at: &Path, name: &str, detections: &[Detection]) {
     std::fs::create_dir_all(at.join(name)).unwrap();
     for (index, found) in detections.iter().enumerate() {
         let mut found = found.clone();
