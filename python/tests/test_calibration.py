@@ -173,7 +173,7 @@ def test_check(calibration, detections, board):
 def test_acceptance(calibration, detections, board):
     known = deltille.calibrate(detections[::2], board, board_accuracy_mm=0)
     found = deltille.accept(known, detections[1::2], board_accuracy_mm=0, limit_mm=1)
-    assert found.verdict == "conforms" and found.frames == len(detections[1::2]) and found.took_part == []
+    assert found.verdict == "conforms" and found.frames == len(detections[1::2]) and found.reused == []
     assert found.error_mm.shape == found.known_mm.shape == found.expanded_mm.shape
     assert numpy.mean(abs(found.error_mm) < found.expanded_mm) > 0.8 and (found.combined_mm > 0).all()
     assert 0 < found.probing_rms_mm < found.probing_mm
@@ -183,7 +183,7 @@ def test_acceptance(calibration, detections, board):
     assert one.verdict is None and set(one.known_mm) == {100.0}
     with pytest.raises(deltille.CalibrationError, match="no corner 1, 99"):
         deltille.accept(known, detections[1::2], lengths=[((1, 2), (1, 99), 100.0, 0.001)])
-    with pytest.raises(deltille.CalibrationError, match="took part"):
+    with pytest.raises(deltille.CalibrationError, match="used for the calibration"):
         deltille.accept(known, detections[::2])
 
 

@@ -69,10 +69,10 @@ impl Acceptance {
         self.found.probing.rms_mm
     }
 
-    /// Names of the images that were not used because they took part in the calibration.
+    /// Names of the images that were not used because they were used for the calibration.
     #[getter]
-    fn took_part(&self) -> Vec<String> {
-        self.found.took_part.clone()
+    fn reused(&self) -> Vec<String> {
+        self.found.reused.clone()
     }
 
     /// Returns the text that ``deltille accept -o`` writes, with the uncertainty budget of each length.

@@ -19,8 +19,8 @@ pub struct Acceptance {
     pub probing: Probing,
     /// Number of frames: images of one camera, or simultaneous images of a rig.
     pub frames: usize,
-    /// Names of the views that were not used because they took part in the calibration.
-    pub took_part: Vec<String>,
+    /// Names of the views that were not used because they were used for the calibration.
+    pub reused: Vec<String>,
     /// The limit.
     pub limit: Option<Limit>,
 }
@@ -209,7 +209,7 @@ mod tests {
             lengths,
             probing: Probing::default(),
             frames: 1,
-            took_part: Vec::new(),
+            reused: Vec::new(),
             limit,
         };
         let each: Vec<_> = found.lengths.iter().map(|of| found.conformity(of).unwrap()).collect();

@@ -12,8 +12,7 @@ use glam::{DMat3, DVec2, DVec3};
 use nalgebra::{DMatrix, Matrix2, Matrix6, RowDVector, RowVector2, SMatrix, Vector2, Vector6};
 
 use super::request::CornerLabel;
-use super::run::CameraOf;
-use super::sensitivity::{Measured, Point, Sensitivity, Variances};
+use super::sensitivity::{CameraOf, Measured, Point, Sensitivity, Variances};
 use crate::input::observation::Observation;
 use crate::uncertainty::projection::{by_motion, by_parameters};
 use deltille_core::camera::{Pose, Projection};

@@ -9,9 +9,9 @@ use super::acceptance::{Acceptance, Budget, LengthError, Probing};
 use super::in_plane::{InPlane, Seen};
 use super::lines;
 use super::request::{AcceptanceRequest, CornerLabel};
-use super::sensitivity::{Measured, Point, Variances, variance};
+use super::sensitivity::{CameraOf, Measured, Point, Variances, variance};
 use super::triangulated::{Image, Triangulated};
-use crate::estimate::values::{CameraEstimate, Estimate};
+use crate::estimate::values::Estimate;
 use crate::input::calibration::Calibration;
 use crate::input::observation::{MIN_CORNERS, Observation, View};
 use crate::problem::corner_map::CornerMap;
@@ -19,7 +19,7 @@ use crate::start::pose::{estimate_pose, median_off_px};
 use crate::uncertainty::board_errors::{SHEET, accuracy, sheets};
 use deltille_core::camera::Pose;
 
-/// A view took part in the calibration if it has the name of one of its views, and the pose of that view fits it with a median
+/// A view was used for the calibration if it has the name of one of its views, and the pose of that view fits it with a median
 /// residual below this number of RMS residuals.
 const SAME: f64 = 2.0;
 
@@ -38,9 +38,9 @@ pub enum AcceptanceError {
         "one camera takes the scale from the target, so that its expansion has no effect: omit the temperature and the expansion"
     )]
     Temperature,
-    /// All views took part in the calibration.
-    #[error("all {views} views took part in the calibration: take other photographs")]
-    TookPart {
+    /// All views were used for the calibration.
+    #[error("all {views} views were used for the calibration: take other photographs")]
+    Reused {
         /// Number of views.
         views: usize,
     },
@@ -60,22 +60,6 @@ pub enum AcceptanceError {
 
 /// The views of each frame, with the indices of their cameras.
 type Frames = BTreeMap<String, Vec<(usize, View)>>;
-
-/// A camera and its unknowns.
-pub(super) struct CameraOf<'a> {
-    pub estimate: &'a CameraEstimate,
-    /// The estimated parameters.
-    pub free: Vec<usize>,
-    /// The first of its unknowns among those of all cameras.
-    pub column: usize,
-}
-
-impl CameraOf<'_> {
-    /// Number of its unknowns: parameters, then the pose if that was estimated.
-    pub(super) fn unknowns(&self) -> usize {
-        self.free.len() + if self.estimate.pose_sd.is_some() { 6 } else { 0 }
-    }
-}
 
 /// What all frames have in common.
 struct Test<'a> {
@@ -117,10 +101,10 @@ impl Calibration {
         if request.temperature.is_some() && !is_triangulated {
             return Err(AcceptanceError::Temperature);
         }
-        let (views, took_part) = self.new_views(before);
+        let (views, reused) = self.new_views(before);
         let count = views.values().map(Vec::len).sum::<usize>();
-        if count == 0 && !took_part.is_empty() {
-            return Err(AcceptanceError::TookPart { views: took_part.len() });
+        if count == 0 && !reused.is_empty() {
+            return Err(AcceptanceError::Reused { views: reused.len() });
         }
         let test = self.test(before, request).ok_or(AcceptanceError::Uncertainty)?;
         let mut found = Acceptance {
@@ -128,7 +112,7 @@ impl Calibration {
             lengths: Vec::new(),
             probing: Probing::default(),
             frames: 0,
-            took_part,
+            reused,
             limit: request.limit,
         };
         let mut squares = 0.0;
@@ -151,9 +135,9 @@ impl Calibration {
         Ok(found)
     }
 
-    /// The new views, and the names of those that took part in the calibration.
+    /// The new views, and the names of those that were used for the calibration.
     fn new_views(&self, before: &Estimate) -> (Frames, Vec<String>) {
-        let (mut frames, mut took_part) = (Frames::new(), Vec::new());
+        let (mut frames, mut reused) = (Frames::new(), Vec::new());
         let panels = self.panel_poses();
         for (index, (of, known)) in self.cameras.iter().zip(&before.cameras).enumerate() {
             for view in &of.views {
@@ -163,14 +147,14 @@ impl Calibration {
                     off_px < SAME * of.rms_px
                 });
                 match is_used {
-                    true => took_part.push(view.image.clone()),
+                    true => reused.push(view.image.clone()),
                     false => {
                         frames.entry(view.name.clone()).or_default().push((index, view.clone()))
                     }
                 }
             }
         }
-        (frames, took_part)
+        (frames, reused)
     }
 
     /// `None` without an observed covariance of the estimate.

@@ -213,5 +213,5 @@ fn measured_lengths_replace_those_of_the_target() {
     assert_eq!((found.lengths.len(), found.within()), (6, 6));
     assert!(found.lengths.iter().all(|of| of.budget.target_mm == 0.002));
     let error = calibration(views).accept(&estimate, &request).unwrap_err();
-    assert_eq!(error, AcceptanceError::TookPart { views: 40 });
+    assert_eq!(error, AcceptanceError::Reused { views: 40 });
 }

@@ -10,8 +10,7 @@ use glam::{DMat3, DVec2, DVec3};
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, SMatrix, Vector2, Vector3};
 
 use super::request::CornerLabel;
-use super::run::CameraOf;
-use super::sensitivity::{Measured, Point, Sensitivity, Variances};
+use super::sensitivity::{CameraOf, Measured, Point, Sensitivity, Variances};
 use crate::input::panel::PanelRef;
 use crate::uncertainty::projection::{by_motion, by_parameters};
 use deltille_core::camera::Pose;

@@ -65,6 +65,7 @@ fn html(report: &Report) -> String {
         page += &exactness::uncertainty(camera);
         page += &exactness::residuals(report.estimate, camera, survey);
         if !report.is_rig() {
+            page += &rig::targets(report);
             page += &shared(report);
         }
         page += &distortion(camera, survey);

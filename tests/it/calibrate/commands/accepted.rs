@@ -43,7 +43,8 @@ fn a_camera_and_a_rig_are_accepted_by_their_errors_of_length() {
         // A limit within the uncertainty of the largest error, with all errors below it.
         let found = json(&at.join("a.json"));
         let lengths = found["lengths"].as_array().unwrap();
-        let of = |name: &str| lengths.iter().map(move |of| of[name].as_f64().unwrap().abs());
+        let of =
+            |name: &'static str| lengths.iter().map(move |of| of[name].as_f64().unwrap().abs());
         let largest = of("error_mm").fold(0.0, f64::max);
         let args = format!("accept {input} {common} --limit {}mm", largest * 1.01);
         assert_eq!(output(at, &args).status.code(), Some(3));
@@ -54,7 +55,7 @@ fn a_camera_and_a_rig_are_accepted_by_their_errors_of_length() {
     std::fs::write(at.join("one.csv"), "row_a,col_a,row_b,col_b,length_mm,sd_mm\n1,2,6,99,90,0\n")
         .unwrap();
     for (args, expected) in [
-        ("camera.json corners --limit 1mm".to_owned(), "took part in the calibration"),
+        ("camera.json corners --limit 1mm".to_owned(), "were used for the calibration"),
         ("camera.yaml new/left".to_owned(), "no observed covariance"),
         ("camera.json new/left --limit 0mm".to_owned(), "the limit must be positive"),
         ("camera.json new/left --limit 1mm+2".to_owned(), "such as 0.05mm+L/2000"),

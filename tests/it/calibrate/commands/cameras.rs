@@ -5,15 +5,63 @@ use super::{
     seen_whole, swap,
 };
 use crate::common::page::Page;
-use deltille::camera::{BrownConrady, Camera, Lens};
-use deltille::detect::{Detection, GridCorner};
+use deltille::camera::{BrownConrady, Camera, Lens, Pose};
+use deltille::detect::{Detection, Grid, GridCorner};
 use deltille::export::detection;
+use deltille::family::Family;
 use deltille::lattice::GridKind;
-use deltille::targets::{BoardSpec, Target, TargetSpec};
-use glam::DVec2;
-use rand::SeedableRng;
+use deltille::targets::{BoardSpec, TagSpec, Target, TargetSpec};
+use glam::{DQuat, DVec2, DVec3};
+use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
+
+#[test]
+fn several_boards_calibrate_a_camera_and_their_relative_pose_is_estimated() {
+    let family = Family::shipped(&TagSpec::default().family).unwrap();
+    let boards = [("a", 0), ("b", 100)].map(|(name, first_id)| {
+        let mut spec = BoardSpec::new(GridKind::Deltille, 8, 9, 20.0);
+        spec.tags.as_mut().unwrap().first_id = first_id;
+        Target::build(name, &TargetSpec::Board(spec), Some(&family)).unwrap()
+    });
+    let beside =
+        Pose { rotation: DQuat::from_rotation_y(0.2), translation: DVec3::new(230.0, 15.0, 4.0) };
+    let mut random = ChaCha8Rng::seed_from_u64(4);
+    let seen = (0..15).map(|_| {
+        let mut any = |reach: f64| random.random_range(-reach..reach);
+        let tilt = DVec3::new(any(0.6), any(0.6), 0.0);
+        let rotation = DQuat::from_scaled_axis(tilt) * DQuat::from_rotation_x(std::f64::consts::PI);
+        let centre = DVec3::new(any(60.0), any(40.0), 550.0);
+        let pose = Pose { rotation, translation: centre - rotation * DVec3::new(230.0, 80.0, 0.0) };
+        let mut both = Detection::new("", [1600, 1200], Vec::new());
+        for (board, pose) in boards.iter().zip([pose, pose.after(&beside)]) {
+            let of_board = seen_whole(board, &camera(), &pose, &mut random);
+            both.targets.push(board.identity());
+            let name = || Some(board.name.to_string());
+            both.grids
+                .extend(of_board.grids.into_iter().map(|grid| Grid { target: name(), ..grid }));
+        }
+        both
+    });
+    let seen: Vec<Detection> = seen.collect();
+    let folder = folder(&boards[0], &seen);
+    let at = folder.path();
+    for board in &boards {
+        std::fs::write(at.join(format!("{}.json", board.name)), board.to_json()).unwrap();
+    }
+    let both = "calibrate corners --target a.json --target b.json --model radtan";
+    let text = done(at, &format!("{both} --report page.html"));
+    assert!(text.lines().any(|line| line.starts_with("target b: at (")), "{text}");
+    let found = json(&at.join("camera.json"));
+    let of_b = &found["targets"][1];
+    let at_mm = of_b["scene_from_target"]["translation_mm"].as_array().unwrap();
+    let off = |axis: usize| at_mm[axis].as_f64().unwrap() - beside.translation[axis];
+    assert!((0..3).all(|axis| off(axis).abs() < 0.2), "{of_b}");
+    assert!((found["parameters"][0]["value"].as_f64().unwrap() - 625.0).abs() < 0.5);
+    let page = std::fs::read_to_string(at.join("page.html")).unwrap();
+    assert!(page.contains("Relative target poses"));
+    refused(at, &format!("{both} --measure-target"), &["--measure-target: there are 2 targets"]);
+}
 
 #[test]
 fn a_camera_is_calibrated_and_read_back() {

@@ -62,11 +62,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let request = args.request(&known.printing.target, &known.limits)?;
     let found = args.views.views(&known)?.accept(&known.before, &request);
     let found = found.with_context(|| args.views.camera().display().to_string())?;
-    if !found.took_part.is_empty() {
+    if !found.reused.is_empty() {
         log!(
-            "note: not used, because they took part in the calibration: {}, such as {}",
-            counted(found.took_part.len(), "image"),
-            found.took_part[0]
+            "note: not used, because they were used for the calibration: {}, such as {}",
+            counted(found.reused.len(), "image"),
+            found.reused[0]
         );
     }
     if let Some(path) = &path {

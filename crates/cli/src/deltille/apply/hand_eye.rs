@@ -80,9 +80,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Some((camera, _)) => (Intrinsics::Known(camera.camera.clone()), Some(camera.clone())),
         None => (Intrinsics::Unknown(args.model), None),
     };
-    let Sightings { calibration, views, target, detections, unnamed, .. } =
+    let Sightings { calibration, views, printed, detections, unnamed, .. } =
         args.sightings.read(&intrinsics, false)?;
-    if let (Some(path), Some((_, with)), Some(printing)) = (&args.camera, &known, &target) {
+    ensure!(printed.len() < 2, "--target: give the one target that is mounted");
+    if let (Some(path), Some((_, with)), [printing]) = (&args.camera, &known, &printed[..]) {
         let targets = std::slice::from_ref(&printing.target);
         camera_file::check_or_note(path, with, targets, args.sightings.assumes_target())?;
     }

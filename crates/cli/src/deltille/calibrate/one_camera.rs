@@ -25,7 +25,7 @@ use deltille::camera::{Camera, CameraFile, Lens, PROJECTION_PARAMETERS, Pose, Sp
 use deltille::export::camera::FormatError;
 use deltille::export::named::Format;
 use deltille::export::{CAMERA_FORMATS, CameraFormat, Written, calibration, saved};
-use deltille::targets::TargetIdentity;
+use deltille::targets::{Target, TargetIdentity};
 use deltille_core::words::{counted, places, shown};
 
 /// Correlations of at least this magnitude are reported: these parameters can hardly be separated.
@@ -91,12 +91,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let page = args.solve.page(&stem, args.overwrite)?;
     args.solve.covariance.check(args.overwrite, &[path.with_extension("json")])?;
     let measure = args.solve.measures_target();
-    let Sightings { calibration, views, target, empty, left_out, print, unnamed, .. } =
+    let Sightings { calibration, views, printed, empty, left_out, print, unnamed, .. } =
         args.sightings.read(&intrinsics, measure)?;
-    if let (Some(known), Some(printing)) = (&args.fixed_intrinsics, &target) {
-        let targets = std::slice::from_ref(&printing.target);
+    let targets: Vec<Target> = printed.iter().map(|one| one.target.clone()).collect();
+    if let (Some(known), false) = (&args.fixed_intrinsics, targets.is_empty()) {
         let is_assumed = args.sightings.assumes_target();
-        camera_file::check_or_note(known, &known_with, targets, is_assumed)?;
+        camera_file::check_or_note(known, &known_with, &targets, is_assumed)?;
     }
     for picture in &empty {
         log!("{}: excluded: no board found", picture.display());
@@ -137,7 +137,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         (files, refused) =
             args.files(&stem, (&camera.camera, Some(camera)), of_camera, &views, &json);
     }
-    files.extend(solved.measured(&stem, target.as_ref()));
+    files.extend(solved.measured(&stem, printed.first()));
     let mut written = write_all(folder, &files, args.overwrite)?;
     if let Some(page) = page {
         solved.write_page(&page, &stem, &[args.images.as_deref()], args.overwrite)?;

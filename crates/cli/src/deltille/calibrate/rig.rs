@@ -11,7 +11,7 @@ use super::sightings;
 use super::sightings::{GridArgs, SheetArgs};
 use super::solving::{
     Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out,
-    projection_uncertainty, richest, sample, with_constraints, without_outliers,
+    projection_uncertainty, richest, sample, with_constraints, within, without_outliers,
 };
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::written::{
@@ -23,7 +23,7 @@ use crate::output::{Overwrite, check_folder, fixed, log, say};
 use crate::run::{FAILED, report};
 use crate::values::format;
 use deltille::calibrate::{
-    Calibration, CameraViews, Estimate, Excluded, Intrinsics, Model, Reference, TargetMap,
+    Calibration, CameraViews, Estimate, Excluded, Intrinsics, Model, TargetMap,
 };
 use deltille::camera::{Camera, CameraFile, Pose};
 use deltille::detect::{Detection, InkEstimate};
@@ -91,11 +91,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         None => (target_file::read_all_placed(&args.target, &limits).context("--target")?, None),
     };
     let targets: Vec<Target> = printed.iter().map(|one| one.target.clone()).collect();
-    let reference = match (grid, targets.as_slice()) {
-        (Some(grid), _) => Reference::Grid(grid),
-        (None, [only]) => Reference::Target(only),
-        (None, several) => Reference::Scene(several),
-    };
+    let reference = sightings::reference(grid, &targets);
     let sheet = args.sheet.read(&limits, &reference.identities(), &printed)?;
     let panels = sightings::panels(&reference, &sheet)?;
     let candidates = args.candidates(&names);
@@ -331,12 +327,6 @@ fn of_name<'a>(given: &'a [(String, PathBuf)], name: &str) -> Option<&'a Path> {
     given.iter().find(|(of, _)| of == name).map(|(_, path)| path.as_path())
 }
 
-/// Returns the largest standard deviations of a position and a rotation.
-fn within(sd: &[f64; 6]) -> String {
-    let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
-    format!(" ± {:.3} mm, {:.4}°", largest(&sd[3..]), largest(&sd[..3]).to_degrees())
-}
-
 fn summary(solved: &Calibrated) -> String {
     let estimate = &solved.estimate;
     let headline = |estimate: &Estimate| {
@@ -372,11 +362,6 @@ fn summary(solved: &Calibrated) -> String {
              px of noise",
             depth.distance_mm, depth.sd_mm, depth.mm_per_px
         ));
-    }
-    for target in estimate.targets.iter().filter(|_| estimate.targets.len() > 1) {
-        let at = target.scene_from_target.translation.to_array().map(|mm| fixed(mm, 2));
-        let deviation = target.pose_sd.map_or(String::new(), |sd| within(&sd));
-        lines.push(format!("target {}: at ({}) mm{deviation}", target.name, at.join(", ")));
     }
     lines.extend(solved.lines());
     lines.extend(estimate.held_out.iter().map(|test| format!("held out: {}", headline(test))));

@@ -38,9 +38,10 @@ pub struct SightingsArgs {
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     film: FilmArgs,
-    /// Target description: the .json of `deltille board`, or a .dsc
+    /// Target description: the .json of `deltille board`, or a .dsc; repeatable for several targets that do not move
+    /// relative to each other, whose relative poses are estimated
     #[arg(long, value_name = "FILE")]
-    target: Option<PathBuf>,
+    target: Vec<PathBuf>,
     #[command(flatten)]
     grid: GridArgs,
     /// Use --target even if the detections name another target
@@ -109,8 +110,8 @@ pub struct Sightings {
     pub views: Vec<View>,
     /// The calibration problem, without cameras yet.
     pub calibration: Calibration,
-    /// The target, with nominal corner positions.
-    pub target: Option<Printing>,
+    /// The targets, with nominal corner positions.
+    pub printed: Vec<Printing>,
     /// Detection files without a view.
     pub empty: Vec<PathBuf>,
     /// Detections that do not belong to the target.
@@ -157,16 +158,21 @@ impl SightingsArgs {
     /// only views with unambiguous labels are used.
     pub fn read(&self, intrinsics: &Intrinsics, measure_target: bool) -> anyhow::Result<Sightings> {
         let limits = self.limits.limits();
-        let target = self.target.as_deref().map(|path| target_file::read_placed(path, &limits));
-        let target: Option<Printing> = target.transpose().context("--target")?;
-        let reference = match (&target, self.grid.read()?) {
-            (Some(printing), _) => Reference::Target(&printing.target),
-            (None, Some(grid)) => Reference::Grid(grid),
-            _ => bail!(
-                "--target FILE is needed, or --grid deltille or checker with --edge for untagged boards"
-            ),
-        };
-        let sheet = self.sheet.read(&limits, &reference.identities(), target.as_slice())?;
+        let mut printed =
+            target_file::read_all_placed(&self.target, &limits).context("--target")?;
+        let targets: Vec<Target> = printed.iter().map(|one| one.target.clone()).collect();
+        ensure!(
+            !measure_target || targets.len() < 2,
+            "--measure-target: there are {} targets; measure each of them in a calibration of its own",
+            targets.len()
+        );
+        let grid = self.grid.read()?;
+        ensure!(
+            grid.is_some() || !targets.is_empty(),
+            "--target FILE is needed, or --grid deltille or checker with --edge for untagged boards"
+        );
+        let reference = reference(grid, &targets);
+        let sheet = self.sheet.read(&limits, &reference.identities(), &printed)?;
         let read =
             seen(&self.inputs, &self.film, intrinsics, &reference, &limits, self.assume_target)?;
         let Read { mut views, empty, mut left_out, ink, detections } = shown(read)?;
@@ -188,8 +194,17 @@ impl SightingsArgs {
         let unnamed = unnamed(&detections, &reference).filter(|_| !self.assume_target);
         let named = detections.iter().flat_map(|(_, found)| found.targets.clone());
         let calibration = Calibration::of(&reference, panels).named_by(named);
-        let target = target.or(board.map(Printing::from));
-        Ok(Sightings { calibration, target, views, empty, left_out, print, detections, unnamed })
+        printed.extend(board.map(Printing::from));
+        Ok(Sightings { calibration, printed, views, empty, left_out, print, detections, unnamed })
+    }
+}
+
+/// The photographed board without tags, target, or scene of several targets.
+pub fn reference(grid: Option<UntaggedGrid>, targets: &[Target]) -> Reference<'_> {
+    match (grid, targets) {
+        (Some(grid), _) => Reference::Grid(grid),
+        (None, [only]) => Reference::Target(only),
+        (None, several) => Reference::Scene(several),
     }
 }
 

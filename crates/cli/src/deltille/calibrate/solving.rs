@@ -11,7 +11,7 @@ use clap::ValueEnum;
 use super::constraints::ConstraintArgs;
 use super::covariance_file::CovarianceArgs;
 use crate::deltille::files::written::{File, sample_of, text_file};
-use crate::output::{self, Overwrite, log};
+use crate::output::{self, Overwrite, fixed, log};
 use crate::run::FAILED;
 use crate::values::{distance, whole};
 use deltille::calibrate::{
@@ -331,14 +331,20 @@ impl Calibrated {
         vec![file("json", measured.to_json()), file("svg", target_map_svg(map))]
     }
 
-    /// Describes the print and the sheet, one property per line.
+    /// Describes the relative poses of several targets, the print and the sheet, one property per line.
     pub fn lines(&self) -> Vec<String> {
+        let targets = &self.estimate.targets;
+        let poses = targets.iter().filter(|_| targets.len() > 1).map(|target| {
+            let at = target.scene_from_target.translation.to_array().map(|mm| fixed(mm, 2));
+            let deviation = target.pose_sd.map_or(String::new(), |sd| within(&sd));
+            format!("target {}: at ({}) mm{deviation}", target.name, at.join(", "))
+        });
         let shape = self.estimate.shape.as_ref().map(describe_shape);
         let ink = self.print.ink.filter(|ink| ink.used);
         let ink = ink.map(|ink| format!("ink: {ink}; corners are corrected for it"));
         let views = self.estimate.views_of_a_corner();
         let map = self.estimate.map.as_ref().map(|map| mapped(map, views));
-        shape.into_iter().chain(map).chain(ink).collect()
+        poses.chain(shape).chain(map).chain(ink).collect()
     }
 }
 
@@ -446,4 +452,10 @@ pub fn without_outliers(outliers: usize, inlier_rms_px: f64) -> String {
         0 => String::new(),
         n => format!(", {inlier_rms_px:.4} px without {}", counted(n, "outlier")),
     }
+}
+
+/// Returns the largest standard deviations of a position and a rotation.
+pub fn within(sd: &[f64; 6]) -> String {
+    let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
+    format!(" ± {:.3} mm, {:.4}°", largest(&sd[3..]), largest(&sd[..3]).to_degrees())
 }

@@ -20,7 +20,7 @@ struct AcceptanceFile<'a> {
     largest: Option<LengthRecord<'a>>,
     lengths_within_uncertainty: usize,
     probing: ProbingRecord<'a>,
-    took_part: &'a [String],
+    reused: &'a [String],
     lengths: Vec<LengthRecord<'a>>,
 }
 
@@ -97,7 +97,7 @@ pub fn write(found: &Acceptance) -> String {
             rms_mm: probing.rms_mm,
             corners: probing.corners,
         },
-        took_part: &found.took_part,
+        reused: &found.reused,
         lengths: found.lengths.iter().map(|of| length(found, of)).collect(),
     };
     json::to_text(&file, 2)

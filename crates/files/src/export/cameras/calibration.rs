@@ -11,6 +11,7 @@ use super::estimate::{
 };
 pub use super::estimate::{Print, Residuals, is_failure};
 use super::finding::{FindingRecord, records};
+use super::rig::{TargetRecord, targets};
 use deltille_calibrate::{Diagnosis, Estimate, Excluded};
 use deltille_core::camera::SplineGrid;
 use deltille_core::detection::InkEstimate;
@@ -45,6 +46,8 @@ struct CalibrationFile<'a> {
     common_px: Option<f64>,
     #[serde(skip_serializing_if = "<[TargetIdentity]>::is_empty")]
     calibrated_with: &'a [TargetIdentity],
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    targets: Vec<TargetRecord<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     print_scale: Option<[f64; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -99,6 +102,7 @@ pub fn write(
         sigma: found.sigma,
         common_px: found.common_px,
         calibrated_with: &found.calibrated_with,
+        targets: targets(found),
         print_scale: print.scale,
         ink: print.ink,
         board_shape: found.shape.map(shape),

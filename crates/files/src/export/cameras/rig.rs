@@ -55,7 +55,7 @@ struct RigFile<'a> {
 
 /// One of several targets.
 #[derive(Serialize)]
-struct TargetRecord<'a> {
+pub(super) struct TargetRecord<'a> {
     name: &'a str,
     /// Number of its panels.
     panels: usize,
@@ -177,7 +177,8 @@ fn depth(found: &Estimate) -> Vec<Depth<'_>> {
     records.collect()
 }
 
-fn targets(found: &Estimate) -> Vec<TargetRecord<'_>> {
+/// The poses of several targets; empty for one.
+pub(super) fn targets(found: &Estimate) -> Vec<TargetRecord<'_>> {
     let several = found.targets.iter().filter(|_| found.targets.len() > 1);
     let records = several.map(|target| TargetRecord {
         name: &target.name,
