@@ -2,11 +2,13 @@
 
     timing.py render <board.json> <folder> [--seed N] [--readout MS] [--offset MS] [--drift PPM]
     timing.py check <deltille> <board.json> <rig.json> <folder> ...        # rig.json of `rig_recording.py check`
+    timing.py calibrate <deltille> <board.json> <folder> ...
 
 The page is drawn by poppler and filmed by numpy and OpenCV as in `from_video.py`, by the cameras of `rig_recording.py`. The left
 camera has a global shutter and takes 30 images a second. The right one takes 25; its rows are exposed one after the other, in
 bands of 8 rows, and its clock has an offset and a drift. `check` compares the answers of `deltille timing` with the truth, and
-those from the left video alone.
+those from the left video alone. `calibrate` compares with the truth the camera from the right video alone, with and without
+`--estimate-timing`, and with this option the rig from both videos.
 """
 
 import argparse
@@ -77,6 +79,50 @@ def check(program, board, rig, folder):
     assert not left["readout_s"]["significant"]
 
 
+def deviations(record, truth):
+    """Errors of the parameters in observed standard deviations."""
+    found = {one["name"]: one for one in record["parameters"] if one.get("observed_sd")}
+    return {name: (one["value"] - truth.get(name, 0)) / one["observed_sd"] for name, one in found.items()}
+
+
+def calibrate(program, board, folder):
+    folder = pathlib.Path(folder)
+    readout, offset, drift = json.loads((folder / "truth.json").read_text())
+    common = ["--target", board, "--board-accuracy", "0", "--model", "radtan", "--force"]
+
+    def run(*command):
+        done = subprocess.run([program, *map(str, command), *common], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        print(done.stderr.replace("\r", "\n").splitlines()[-1:], flush=True)
+
+    def shown(what, off):
+        worst = max(map(abs, off.values()))
+        print(f"{what}: {', '.join(f'{name} {sigmas:.1f}' for name, sigmas in off.items())} σ", flush=True)
+        return worst
+
+    for name, option in (("without", []), ("with", ["--estimate-timing"])):
+        run("calibrate", folder / "right.avi", *option, "-o", folder / f"{name}.yaml")
+        record = json.loads((folder / f"{name}.json").read_text())
+        errors = {one["name"]: one["value"] - CAMERAS["right"].get(one["name"], 0) for one in record["parameters"]}
+        print(name, ", ".join(f"{key} {error:.3g}" for key, error in errors.items()), f"RMS {record['rms_px']:.4f} px")
+        worst = shown(f"right camera, {name} --estimate-timing", deviations(record, CAMERAS["right"]))
+        assert name == "without" or worst < 3.5
+    cameras = [part for name in CAMERAS for part in ("--camera", f"{name}={folder / name}.avi")]
+    run("rig", *cameras, "--estimate-timing", "-o", folder)
+    record = json.loads((folder / "rig.json").read_text())
+    for camera in record["cameras"]:
+        assert shown(camera["name"], deviations(camera, CAMERAS[camera["name"]])) < 3.5
+    pose = record["cameras"][1]["camera_from_rig"]
+    turn, step = np.reshape(pose["rotation"], (3, 3)), np.array(pose["translation_mm"])
+    angle = np.degrees(np.linalg.norm(cv2.Rodrigues(turn @ RIGHT_FROM_LEFT[0].T)[0]))
+    print(f"relative pose: off by {angle:.4f}°, {step - RIGHT_FROM_LEFT[1]} mm; {pose}")
+    timing = json.loads((folder / "rig-timing.json").read_text())["cameras"][1]
+    for name, truth in (("readout_s", readout), ("offset_s", offset), ("drift", drift)):
+        error = timing[name]["value"] - truth
+        print(f"{name}: error {error:.3g}, {error / timing[name]['sd']:.1f} σ")
+        assert abs(error) < 4 * timing[name]["sd"], name
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     commands = parser.add_subparsers(dest="command", required=True)
@@ -90,9 +136,16 @@ if __name__ == "__main__":
     for one in ("program", "board", "rig"):
         checking.add_argument(one)
     checking.add_argument("folder", nargs="+")
+    calibrating = commands.add_parser("calibrate")
+    for one in ("program", "board"):
+        calibrating.add_argument(one)
+    calibrating.add_argument("folder", nargs="+")
     args = parser.parse_args()
     if args.command == "render":
         render(args.board, args.folder, args.seed, [args.readout * 1e-3, args.offset * 1e-3, args.drift * 1e-6])
     else:
         for folder in args.folder:
-            check(args.program, args.board, args.rig, folder)
+            if args.command == "check":
+                check(args.program, args.board, args.rig, folder)
+            else:
+                calibrate(args.program, args.board, folder)

@@ -20,7 +20,8 @@
 //!
 //! `adjusted` runs 4 to 7 on all views. `solve` wraps it and holds out frames; `automatic` selects
 //! a model with `solve`; `located` computes the pose of a target. `compare` and `next_view` read
-//! estimates; `selection` selects frames of a recording by the gain of `next_view`. Every module may import `model` (lens models), `matrix` (in results), `error`
+//! estimates; `selection` selects frames of a recording by the gain of `next_view`; `moving` compensates frames for the timing
+//! of their cameras. Every module may import `model` (lens models), `matrix` (in results), `error`
 //! (failures), `excluded` (excluded views and the reasons) and `cancel`; otherwise a module imports
 //! only from modules above it in this list.
 //!
@@ -55,6 +56,7 @@ mod input;
 mod located;
 mod matrix;
 mod model;
+mod moving;
 mod next_view;
 mod problem;
 mod selection;
@@ -114,6 +116,7 @@ pub use input::views::{Named, ViewSet, views};
 pub use input::weights::Weights;
 pub use matrix::Matrix;
 pub use model::{Model, ModelError};
+pub use moving::CompensationError;
 pub use next_view::guide::{Guide, Guided, NextView, ProposedCorner};
 pub use next_view::holding::{HoldStatus, HoldTracker};
 pub use problem::shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};

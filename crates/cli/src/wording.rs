@@ -24,6 +24,7 @@ const fn named(setting: Setting) -> (&'static str, &'static str) {
         Setting::BoardTwoSidedMm => ("deltille board", "--two-sided"),
         Setting::CalibrateModel => ("deltille calibrate", "--model"),
         Setting::CalibrationBoardShape => ("deltille calibrate", "--board-shape"),
+        Setting::CalibrationCompensatedForTiming => ("deltille calibrate", "--estimate-timing"),
         Setting::CalibrationMeasureTarget => ("deltille calibrate", "--measure-target"),
         Setting::CalibrationRefinePanels => ("deltille rig", "--refine-target"),
         Setting::CalibrationWrite => ("deltille calibrate", ""),

@@ -44,6 +44,7 @@ settings! {
     BoardTwoSidedMm = "BoardSpec::two_sided_mm",
     CalibrateModel = "calibrate::Model",
     CalibrationBoardShape = "Calibration::board_shape",
+    CalibrationCompensatedForTiming = "Calibration::compensated_for_timing",
     CalibrationMeasureTarget = "Calibration::measure_target",
     CalibrationRefinePanels = "Calibration::refine_panels",
     CalibrationWrite = "calibration::write",

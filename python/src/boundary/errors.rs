@@ -42,6 +42,7 @@ pub fn keyword(setting: Setting) -> String {
         Setting::BoardTwoSidedMm => "two_sided_mm",
         Setting::CalibrateModel => "model",
         Setting::CalibrationBoardShape => "board_shape",
+        Setting::CalibrationCompensatedForTiming => "`deltille calibrate --estimate-timing`",
         Setting::CalibrationMeasureTarget => "measure_target",
         Setting::CalibrationRefinePanels => "refine_target=True",
         Setting::CalibrationWrite => "Calibration.save",

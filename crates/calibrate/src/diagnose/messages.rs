@@ -12,8 +12,8 @@ use crate::model::Model;
 use crate::start::symmetry::LabelRotation;
 use deltille_core::camera::Camera;
 use deltille_core::setting::Setting::{
-    CalibrateModel, CalibrationBoardShape, CalibrationMeasureTarget, CalibrationRefinePanels,
-    SightingBend, SightingStretch,
+    CalibrateModel, CalibrationBoardShape, CalibrationCompensatedForTiming,
+    CalibrationMeasureTarget, CalibrationRefinePanels, SightingBend, SightingStretch,
 };
 use deltille_core::words::{counted, p_value, places};
 
@@ -457,7 +457,8 @@ fn rolling_shutter(shutter: &RollingShutter, all: usize) -> String {
     format!(
         "rolling shutter: rows are displaced by {shear_px:.1} px between the first and the last, in {views} of {all} \
          views ({}; modelling it leaves {left_px:.3} px RMS), because the board or the camera moved during readout; \
-         keep both still for each image, or use a camera with a global shutter",
+         keep both still for each image, use a camera with a global shutter, or calibrate from all frames of a recording with \
+         {CalibrationCompensatedForTiming}",
         p_value(*significance)
     )
 }

@@ -95,7 +95,7 @@ impl Calibration {
     }
 
     /// The best calibration of a camera alone, without other unknowns.
-    fn provisional(&self, camera: usize) -> Option<Estimate> {
+    pub(crate) fn provisional(&self, camera: usize) -> Option<Estimate> {
         let tried = match &self.cameras[camera].intrinsics {
             Intrinsics::Unknown(_) => PROVISIONAL.map(Intrinsics::from).to_vec(),
             Intrinsics::Known(camera) | Intrinsics::Near { camera, .. } => {

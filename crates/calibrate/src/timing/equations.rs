@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use super::motion::Motion;
 use super::values::TimedCamera;
 use crate::input::observation::{Observation, View};
-use deltille_core::camera::{Pose, Projection};
+use deltille_core::camera::{Camera, Pose, Projection};
 
 /// Unknowns of each camera: readout, offset and drift.
 pub(super) const OF_CAMERA: usize = 3;
@@ -74,9 +74,14 @@ struct Predicted {
     row: f64,
 }
 
+/// The row of a corner: y/h − ½.
+pub(super) fn row(camera: &Camera, seen: &Observation) -> f64 {
+    (seen.pixel.y + 0.5) / f64::from(camera.height) - 0.5
+}
+
 impl Clock {
     /// The time of a row after the middle of the recording.
-    fn time_s(&self, stamp_s: f64, row: f64) -> f64 {
+    pub(super) fn time_s(&self, stamp_s: f64, row: f64) -> f64 {
         stamp_s + self.offset_s + self.drift * stamp_s + self.readout_s * row
     }
 
@@ -155,8 +160,7 @@ impl Group<'_> {
         stamp_s: f64,
         seen: &Observation,
     ) -> Option<Predicted> {
-        let height = f64::from(of.camera.height);
-        let row = (seen.pixel.y + 0.5) / height - 0.5;
+        let row = row(&of.camera, seen);
         let time = clock.time_s(stamp_s, row) - self.time_s;
         let pose = self.motion.pose(&self.pose, time);
         let on_target = panel.apply(seen.panel_mm);

@@ -52,69 +52,95 @@ type Stamped<'a> = Vec<(f64, &'a View)>;
 /// # Errors
 /// Returns an error if too few successive frames of the first camera show the target, or if the images do not fit any timing.
 pub fn timing(cameras: &[TimedCamera], panels: &[Pose]) -> Result<Timing, TimingError> {
-    let too_few = |frames: usize| TimingError::TooFew {
-        camera: cameras.first().map_or(String::new(), |of| of.name.clone()),
-        frames,
-        needed: MIN_FRAMES,
-    };
-    let first = cameras.first().ok_or_else(|| too_few(0))?;
-    let stamps = first.views.iter().map(|(ns, _)| *ns);
+    Ok(Solved::of(cameras, panels)?.timing)
+}
+
+/// The timing of cameras, and the path of the target from which it was estimated.
+pub(super) struct Solved<'a> {
+    pub(super) timing: Timing,
+    setting: Setting<'a>,
+    path: Path<'a>,
+}
+
+/// The frames of the first camera: time stamp, pose of the target, view.
+type Path<'a> = Vec<(f64, Pose, &'a View)>;
+
+impl<'a> Solved<'a> {
+    pub(super) fn of(cameras: &'a [TimedCamera], panels: &'a [Pose]) -> Result<Self, TimingError> {
+        let too_few = |frames: usize| TimingError::TooFew {
+            camera: cameras.first().map_or(String::new(), |of| of.name.clone()),
+            frames,
+            needed: MIN_FRAMES,
+        };
+        let first = cameras.first().ok_or_else(|| too_few(0))?;
+        let frames = stamped(cameras);
+        let rig_from_camera = first.camera_from_rig.inverse();
+        let poses = frames[0].iter().filter_map(|(stamp_s, view)| {
+            let pose = estimate_pose(&first.camera, panels, &view.sightings)?;
+            Some((*stamp_s, rig_from_camera.after(&pose), *view))
+        });
+        let mut path: Path<'_> = poses.collect();
+        let intervals = path.windows(2).map(|two| two[1].0 - two[0].0).collect();
+        let interval_s = median(intervals).unwrap_or(0.0);
+        let times: Vec<f64> = path.iter().map(|of| of.0).collect();
+        let anchors = windows(&times, interval_s);
+        if anchors.len() < MIN_FRAMES {
+            return Err(too_few(anchors.len()));
+        }
+        let mut clocks = vec![Clock::default(); cameras.len()];
+        let mut scale = Scale { common: 1.0, sigma: f64::INFINITY };
+        let setting = Setting { cameras, panels, frames, anchors, interval_s };
+        setting.search(&path, &mut clocks);
+        for _ in 0..MAX_ROUNDS {
+            let groups = setting.groups(&path, &clocks);
+            let equations = setting.equations(&groups, &clocks, scale);
+            scale = scaled(&equations);
+            let Some(step) = setting.step(&equations, &clocks) else { break };
+            for ((index, group), of) in groups.iter().zip(&equations) {
+                if let Some(of) = of {
+                    path[*index].1 = moved(&group.pose, &of.step(&step));
+                }
+            }
+            for (clock, step) in clocks.iter_mut().zip(step.as_slice().chunks(OF_CAMERA)) {
+                clock.readout_s += step[0];
+                clock.offset_s += step[1];
+                clock.drift += step[2];
+            }
+            if step.amax() < SETTLED * interval_s {
+                break;
+            }
+        }
+        let timing = setting.result(&setting.groups(&path, &clocks), &clocks, scale);
+        let sides = cameras.iter().map(|of| of.camera.width.max(of.camera.height));
+        if timing.rms_px > FITS * f64::from(sides.max().unwrap_or(0)) {
+            return Err(TimingError::Fit { rms_px: timing.rms_px, searched: SEARCHED / 2 });
+        }
+        Ok(Self { timing, setting, path })
+    }
+
+    /// The frames of the first camera with neighbours, and the images of all cameras next to them in time.
+    pub(super) fn groups(&self, clocks: &[Clock]) -> Vec<Group<'a>> {
+        self.setting.groups(&self.path, clocks).into_iter().map(|(_, group)| group).collect()
+    }
+}
+
+/// The frames of each camera, with times after the middle of the recording of the first one.
+fn stamped(cameras: &[TimedCamera]) -> Vec<Stamped<'_>> {
+    let stamps = cameras.iter().take(1).flat_map(|of| &of.views).map(|(ns, _)| *ns);
     let (earliest, latest) = (stamps.clone().min().unwrap_or(0), stamps.max().unwrap_or(0));
     let middle = earliest + (latest - earliest) / 2;
-    let stamped = |of: &'_ TimedCamera| -> Vec<(f64, usize)> {
+    let of_camera = |of: &'_ TimedCamera| {
         let views = of.views.iter().enumerate();
-        let mut all: Vec<_> =
+        let mut all: Vec<(f64, usize)> =
             views.map(|(index, (ns, _))| ((ns - middle) as f64 * 1e-9, index)).collect();
         all.sort_by(|one, other| one.0.total_cmp(&other.0));
         all.dedup_by(|one, other| one.0 == other.0);
         all
     };
-    let frames: Vec<Stamped<'_>> = cameras
-        .iter()
-        .map(|of| stamped(of).into_iter().map(|(s, index)| (s, &of.views[index].1)).collect())
-        .collect();
-    let rig_from_camera = first.camera_from_rig.inverse();
-    let poses = frames[0].iter().filter_map(|(stamp_s, view)| {
-        let pose = estimate_pose(&first.camera, panels, &view.sightings)?;
-        Some((*stamp_s, rig_from_camera.after(&pose), *view))
+    let frames = cameras.iter().map(|of| {
+        of_camera(of).into_iter().map(|(stamp_s, index)| (stamp_s, &of.views[index].1)).collect()
     });
-    let mut path: Vec<(f64, Pose, &View)> = poses.collect();
-    let intervals = path.windows(2).map(|two| two[1].0 - two[0].0).collect();
-    let interval_s = median(intervals).unwrap_or(0.0);
-    let times: Vec<f64> = path.iter().map(|of| of.0).collect();
-    let anchors = windows(&times, interval_s);
-    if anchors.len() < MIN_FRAMES {
-        return Err(too_few(anchors.len()));
-    }
-    let mut clocks = vec![Clock::default(); cameras.len()];
-    let mut scale = Scale { common: 1.0, sigma: f64::INFINITY };
-    let setting = Setting { cameras, panels, frames: &frames, anchors: &anchors, interval_s };
-    setting.search(&path, &mut clocks);
-    for _ in 0..MAX_ROUNDS {
-        let groups = setting.groups(&path, &clocks);
-        let equations = setting.equations(&groups, &clocks, scale);
-        scale = scaled(&equations);
-        let Some(step) = setting.step(&equations, &clocks) else { break };
-        for ((index, group), of) in groups.iter().zip(&equations) {
-            if let Some(of) = of {
-                path[*index].1 = moved(&group.pose, &of.step(&step));
-            }
-        }
-        for (clock, step) in clocks.iter_mut().zip(step.as_slice().chunks(OF_CAMERA)) {
-            clock.readout_s += step[0];
-            clock.offset_s += step[1];
-            clock.drift += step[2];
-        }
-        if step.amax() < SETTLED * interval_s {
-            break;
-        }
-    }
-    let found = setting.result(&setting.groups(&path, &clocks), &clocks, scale);
-    let sides = cameras.iter().map(|of| of.camera.width.max(of.camera.height));
-    if found.rms_px > FITS * f64::from(sides.max().unwrap_or(0)) {
-        return Err(TimingError::Fit { rms_px: found.rms_px, searched: SEARCHED / 2 });
-    }
-    Ok(found)
+    frames.collect()
 }
 
 /// What does not change during the iterations.
@@ -122,9 +148,9 @@ struct Setting<'a> {
     cameras: &'a [TimedCamera],
     panels: &'a [Pose],
     /// The frames of each camera.
-    frames: &'a [Stamped<'a>],
+    frames: Vec<Stamped<'a>>,
     /// For each frame of the first camera with neighbours, its index, and the first of the five successive frames.
-    anchors: &'a [[usize; 2]],
+    anchors: Vec<[usize; 2]>,
     interval_s: f64,
 }
 
@@ -342,86 +368,18 @@ fn scaled(equations: &[Option<OfGroup>]) -> Scale {
 
 #[cfg(test)]
 mod tests {
-    use glam::{DQuat, DVec3};
-    use rand::{Rng, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-
     use super::*;
-    use crate::input::observation::{Observation, Sighting};
-    use crate::input::panel::PanelRef;
+    use crate::timing::simulated::{NOISE_PX, filmed};
     use deltille_core::camera::Camera;
-
-    const NOISE_PX: f64 = 0.05;
-
-    /// The middle between the first and the last frame of the left camera.
-    const MIDDLE_S: f64 = 0.5 * 299.0 / 30.0;
-
-    /// The path of a board that a hand moves.
-    fn pose(time: f64) -> Pose {
-        let wave = |hertz: f64, phase: f64| (std::f64::consts::TAU * hertz * time + phase).sin();
-        let turn = DVec3::new(0.4 * wave(0.31, 0.0), 0.4 * wave(0.23, 1.0), 0.2 * wave(0.17, 2.0));
-        let place =
-            DVec3::new(60.0 * wave(0.41, 0.5), 40.0 * wave(0.37, 1.5), 60.0 * wave(0.19, 2.5));
-        let rotation = DQuat::from_scaled_axis(turn) * DQuat::from_rotation_x(std::f64::consts::PI);
-        Pose { rotation, translation: place + DVec3::new(-80.0, 80.0, 450.0) }
-    }
-
-    /// An image whose middle row is exposed at this time.
-    fn view(of: &TimedCamera, time: f64, readout: f64, random: &mut ChaCha8Rng) -> Option<View> {
-        let mut observations = Vec::new();
-        for (row, col) in (0..7).flat_map(|row| (0..8).map(move |col| (row, col))) {
-            let panel_mm = DVec3::new(20.0 * f64::from(col), 20.0 * f64::from(row), 0.0);
-            let at = |time: f64| {
-                of.camera.project(of.camera_from_rig.after(&pose(time)).apply(panel_mm))
-            };
-            let mut pixel = at(time)?;
-            for _ in 0..5 {
-                pixel = at(time + readout * ((pixel.y + 0.5) / f64::from(of.camera.height) - 0.5))?;
-            }
-            let mut noise =
-                || NOISE_PX * (0..12).map(|_| random.random_range(-0.5..0.5)).sum::<f64>();
-            pixel += glam::DVec2::new(noise(), noise());
-            let cov = Some([NOISE_PX * NOISE_PX, 0.0, NOISE_PX * NOISE_PX]);
-            observations.push(Observation { row, col, panel_mm, pixel, cov });
-        }
-        let sightings = vec![Sighting { panel: PanelRef::new(0, 0), observations }];
-        let size_px = [of.camera.width, of.camera.height];
-        Some(View { name: String::new(), image: String::new(), size_px, sightings })
-    }
-
-    /// Cameras with these readouts, offsets and drifts, which film at 30 and 25 frames a second for 10 s.
-    fn filmed(clocks: [[f64; 3]; 2], seed: u64) -> [TimedCamera; 2] {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let translation = DVec3::new(-60.0, 2.0, 1.0);
-        let right = Pose { rotation: DQuat::from_rotation_y(0.1), translation };
-        [(Pose::IDENTITY, 30.0, "left"), (right, 25.0, "right")].map(
-            |(camera_from_rig, rate, name)| {
-                let camera = Camera::pinhole(1280, 960, 1.0);
-                let mut of = TimedCamera {
-                    name: name.to_owned(),
-                    camera,
-                    camera_from_rig,
-                    views: Vec::new(),
-                };
-                let [readout, offset, drift] = clocks[usize::from(name == "right")];
-                for index in 0..(10.0 * rate) as usize {
-                    let stamp = index as f64 / rate;
-                    let time = stamp + offset + drift * (stamp - MIDDLE_S);
-                    if let Some(view) = view(&of, time, readout, &mut random) {
-                        of.views.push(((stamp * 1e9) as i64 + 1_000_000_000_000, view));
-                    }
-                }
-                of
-            },
-        )
-    }
 
     #[test]
     fn readouts_offsets_and_drifts_are_found_within_their_uncertainty() {
         let truth = [[0.016, 0.0, 0.0], [-0.009, 0.0213, 2e-4]];
         let (mut squares, mut count) = (0.0, 0.0);
         for seed in 0..6 {
-            let found = timing(&filmed(truth, seed), &[Pose::IDENTITY]).unwrap();
+            let found =
+                timing(&filmed(&Camera::pinhole(1280, 960, 1.0), truth, seed), &[Pose::IDENTITY])
+                    .unwrap();
             assert!(found.rms_px < 1.2 * NOISE_PX, "{found:?}");
             for (of, [readout, offset, drift]) in found.cameras.iter().zip(truth) {
                 let pairs = [(of.readout_s, readout), (of.offset_s, offset), (of.drift, drift)];
@@ -445,7 +403,11 @@ mod tests {
     fn global_shutters_and_synchronous_clocks_are_not_contradicted() {
         let mut significant = 0;
         for seed in 10..16 {
-            let found = timing(&filmed([[0.0; 3]; 2], seed), &[Pose::IDENTITY]).unwrap();
+            let found = timing(
+                &filmed(&Camera::pinhole(1280, 960, 1.0), [[0.0; 3]; 2], seed),
+                &[Pose::IDENTITY],
+            )
+            .unwrap();
             let all = found.cameras.iter().flat_map(|of| [of.readout_s, of.offset_s, of.drift]);
             significant += all.flatten().filter(Measured::is_significant).count();
         }
@@ -454,7 +416,7 @@ mod tests {
 
     #[test]
     fn frames_without_neighbours_are_refused() {
-        let [mut left, _] = filmed([[0.0; 3]; 2], 1);
+        let [mut left, _] = filmed(&Camera::pinhole(1280, 960, 1.0), [[0.0; 3]; 2], 1);
         left.views.truncate(10);
         let error = timing(&[left], &[Pose::IDENTITY]).unwrap_err();
         assert!(error.to_string().starts_with("only 10 frames of left have neighbours"), "{error}");

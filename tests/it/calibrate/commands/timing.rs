@@ -69,3 +69,34 @@ fn the_offset_of_a_camera_is_measured() {
     refused(at, &format!("{timing} {}", of("short")), &["only 12 frames of left have neighbours"]);
     refused(at, &format!("{timing} absent.mp4"), &["absent.mp4: No such file"]);
 }
+
+/// A rig that is calibrated from a moving target only, and recordings that do not suffice.
+#[test]
+fn views_are_compensated_for_the_clocks_of_a_rig() {
+    let target = board(8, 9);
+    let folder = folder(&target, &[]);
+    let at = folder.path();
+    write(at, &target, "waved", 240, [30.0, OFFSET_S]);
+    let of_rig = "--camera left=waved/left --camera right=waved/right";
+    let options = "--target board.json --board-accuracy 0 --model radtan --estimate-timing";
+    let text = done(at, &format!("rig {of_rig} {options} -o ."));
+    assert!(text.contains("right: no significant rolling shutter"), "{text}");
+    let offset = &json(&at.join("rig-timing.json"))["cameras"][1]["offset_s"];
+    let [value, sd] = ["value", "sd"].map(|key| offset[key].as_f64().unwrap());
+    assert!((value - OFFSET_S).abs() < 4.0 * sd && sd < 2e-4, "{text}");
+    // The board moves by up to 3 mm in the offset.
+    let found = &json(&at.join("rig.json"))["cameras"][1];
+    let at_mm = found["camera_from_rig"]["translation_mm"].as_array().unwrap();
+    for (found_mm, truth_mm) in at_mm.iter().zip(right().translation.to_array()) {
+        assert!((found_mm.as_f64().unwrap() - truth_mm).abs() < 0.1, "{found}");
+    }
+
+    let of_one = format!("calibrate waved/left {options}");
+    refused(at, &format!("{of_one} --every 2"), &["--estimate-timing: ", "omit --every 2"]);
+    image::GrayImage::new(64, 48).save(at.join("photo.png")).unwrap();
+    let of_photograph = format!("calibrate photo.png {options}");
+    refused(at, &of_photograph, &["--estimate-timing: photo.png: photographs have no time stamps"]);
+    write(at, &target, "short", 12, [30.0, OFFSET_S]);
+    let of_short = format!("calibrate short/left {options}");
+    refused(at, &of_short, &["--estimate-timing: only 12 frames of camera have neighbours"]);
+}

@@ -81,7 +81,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         None => (Intrinsics::Unknown(args.model), None),
     };
     let Sightings { calibration, views, printed, detections, unnamed, .. } =
-        args.sightings.read(&intrinsics, false)?;
+        args.sightings.read(&intrinsics, false, false)?;
     ensure!(printed.len() < 2, "--target: give the one target that is mounted");
     if let (Some(path), Some((_, with)), [printing]) = (&args.camera, &known, &printed[..]) {
         let targets = std::slice::from_ref(&printing.target);

@@ -1,7 +1,5 @@
 //! `deltille timing`.
 
-use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -10,12 +8,12 @@ use anyhow::{Context, bail, ensure};
 use crate::deltille::calibrate::rig_cameras::{
     CamerasArgs, Source, follow, named, topic, topic_of_one,
 };
-use crate::deltille::calibrate::sightings;
+use crate::deltille::calibrate::{compensation, sightings};
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::{camera_file, target_file};
 use crate::interrupt;
 use crate::output::{self, Overwrite, log};
-use deltille::calibrate::{CameraTiming, Estimate, Reference, TimedCamera, Timing, timing};
+use deltille::calibrate::{Estimate, Reference, TimedCamera, timing};
 use deltille::export::kind::Kind;
 use deltille::export::timing as timing_file;
 use deltille_core::words::shown;
@@ -80,16 +78,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let of = of.context("no camera")?;
         let read = sightings::views_of(given, &reference, args.assume_target)
             .with_context(|| source.option.clone())?;
-        let times: BTreeMap<&str, i64> = read
-            .detections
-            .iter()
-            .filter_map(|(name, found)| Some((name.as_str(), found.time_ns?)))
-            .collect();
-        ensure!(
-            !times.is_empty() || read.detections.is_empty(),
-            "{}: no time stamps; give a video, a recording, or their detections",
-            source.option
-        );
+        let times =
+            compensation::times_ns(&read.detections).with_context(|| source.option.clone())?;
         let mut views = read.views;
         sightings::take_known(&mut views, &reference);
         let size = [of.camera.width, of.camera.height];
@@ -102,8 +92,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                 size[1]
             );
         }
-        let stamped =
-            views.into_iter().filter_map(|view| Some((*times.get(view.name.as_str())?, view)));
+        let stamped = views.into_iter().filter_map(|view| Some((*times.get(&view.name)?, view)));
         let views = stamped.collect();
         let (name, camera, camera_from_rig) =
             (of.name.clone(), of.camera.clone(), of.camera_from_rig);
@@ -122,7 +111,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             found.corner_sd_px
         );
     }
-    output::print(&describe(&found))?;
+    output::print(&compensation::describe(&found))?;
     if let Some(path) = &path {
         output::print(&format!("wrote {}\n", shown(&path.display().to_string())))?;
     }
@@ -151,60 +140,5 @@ impl Args {
         let mut sources = of_rig.of_calibrated(&names)?;
         sources.sort_by_key(|source| names.iter().position(|name| *name == source.name));
         Ok(sources)
-    }
-}
-
-/// Describes the timing, one camera per line.
-fn describe(found: &Timing) -> String {
-    let mut text = String::new();
-    let first = found.cameras.first().map_or("", |of| &of.name);
-    for of in &found.cameras {
-        let name = if of.name.is_empty() { String::new() } else { format!("{}: ", of.name) };
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "{name}{}", readout(of));
-        if let Some(offset) = of.offset_s {
-            let [ms, sd] = [offset.value, offset.sd].map(|s| 1e3 * s);
-            let drift = of.drift.map_or(String::new(), |drift| {
-                format!(", drift {:.1} ± {:.1} ppm", 1e6 * drift.value, 1e6 * drift.sd)
-            });
-            let _ = writeln!(
-                text,
-                "{name}images are taken {ms:.3} ± {sd:.3} ms after those of {first} with the same time stamp{drift}"
-            );
-        } else if of.name != first {
-            let why = match of.frames {
-                0 => format!("no image was taken while {first} took images; the clocks must agree"),
-                _ => MOVE.to_owned(),
-            };
-            let _ = writeln!(text, "{name}the offset to {first} is undetermined: {why}");
-        }
-    }
-    let _ = writeln!(
-        text,
-        "{} frames, every {:.2} ms, median speed {:.0} px/s, RMS {:.4} px per axis",
-        found.frames,
-        1e3 * found.interval_s,
-        found.speed_px_s,
-        found.rms_px
-    );
-    text
-}
-
-/// What determines timing.
-const MOVE: &str = "move the target faster, and record for ten seconds or more";
-
-/// Describes the shutter of a camera.
-fn readout(of: &CameraTiming) -> String {
-    let Some(readout) = of.readout_s else {
-        return format!("the readout is undetermined: {MOVE}");
-    };
-    let [ms, sd] = [readout.value, readout.sd].map(|s| 1e3 * s);
-    match readout.is_significant() {
-        true => format!(
-            "rolling shutter, readout {ms:.3} ± {sd:.3} ms, {:.3} µs per row; corners are displaced by up to ±{:.1} px",
-            1e3 * ms / f64::from(of.height),
-            0.5 * of.shear_px
-        ),
-        false => format!("no significant rolling shutter: readout {ms:.3} ± {sd:.3} ms"),
     }
 }

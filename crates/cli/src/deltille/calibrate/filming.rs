@@ -29,7 +29,7 @@ use deltille::limits::Limits;
 use deltille_core::words::counted;
 
 /// Default number of views of a recording: the largest number with which `--model auto` works.
-const VIEWS: u32 = 60;
+pub const VIEWS: u32 = 60;
 
 /// Detections before they are compared with a target.
 pub struct Given {
@@ -85,7 +85,7 @@ fn is_detection(path: &Path) -> bool {
 }
 
 /// Rejects options that were given, and do not apply to detections.
-pub fn check_none(given: [(&str, bool); 3]) -> anyhow::Result<()> {
+pub fn check_none<const N: usize>(given: [(&str, bool); N]) -> anyhow::Result<()> {
     match given.iter().find(|(_, is_given)| *is_given) {
         Some((option, _)) => {
             bail!(
@@ -118,6 +118,30 @@ impl FilmArgs {
         let film = Film { cameras: vec![camera], every: 1, views: self.views, limits };
         let detections = film.see(reference)?.remove(0);
         Ok(Given::of_images(detections, &inputs[0]))
+    }
+
+    /// Follows the target through all frames of a recording, for `--estimate-timing`.
+    pub fn follow(
+        &self,
+        inputs: &[PathBuf],
+        reference: &Reference,
+        intrinsics: &Intrinsics,
+        limits: &Limits,
+    ) -> anyhow::Result<Given> {
+        if let Some(other) = inputs.iter().find(|path| !is_recording(path)) {
+            bail!(
+                "{}: photographs have no time stamps; give a video or a recording",
+                other.display()
+            );
+        }
+        let [recording] = inputs else {
+            bail!("the time stamps of several recordings cannot be compared; give one");
+        };
+        let images = Images::of(inputs)?;
+        let options = self.recording.options(*limits, &images)?;
+        let camera = FilmCamera { name: "", images, options, intrinsics };
+        let film = Film { cameras: vec![camera], every: 1, views: None, limits };
+        Ok(Given::of_images(film.follow(reference)?.remove(0), recording))
     }
 }
 
@@ -241,10 +265,32 @@ impl Film<'_> {
         Ok(Seen { keyframes: keyframes.finish(), ..seen })
     }
 
-    /// Follows the target through all images of each camera, and returns all detections. Ctrl-C ends the reading.
+    /// Follows the target through all images of each camera, and returns the detections of all images that show it, corrected
+    /// for the joint estimate of the ink. Ctrl-C ends the reading.
     pub fn follow(&self, reference: &Reference) -> anyhow::Result<Vec<Vec<(String, Detection)>>> {
         let detector = detector(reference)?;
         interrupt::keeps_results();
+        let mut found = self.followed(&detector)?;
+        if interrupt::is_raised() {
+            log!("note: interrupted; using the frames so far");
+        }
+        interrupt::end_input();
+        let inks = found.iter().flatten().map(|(_, one)| one.ink).collect::<Vec<_>>();
+        let again = detector.with_ink_of(&inks);
+        if let Some(detector) = again.filter(|_| !interrupt::has_ended_input()) {
+            found = self.followed(&detector)?;
+        }
+        for of_camera in &mut found {
+            let shows = |(_, one): &(String, Detection)| !one.grids.is_empty();
+            // If none shows the target, the reasons are reported.
+            if of_camera.iter().any(shows) {
+                of_camera.retain(shows);
+            }
+        }
+        Ok(found)
+    }
+
+    fn followed(&self, detector: &Detector) -> anyhow::Result<Vec<Vec<(String, Detection)>>> {
         let progress = Mutex::new(FrameProgress::new(None));
         let of_camera = |camera: &FilmCamera| {
             let (mut tracker, mut found) = (Tracker::new(detector.clone()), Vec::new());

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, ensure};
 
+use super::compensation::{self, prepare};
 use super::report_page::check_images;
 use super::sightings::{Sightings, SightingsArgs};
 use super::solving::{
@@ -86,13 +87,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let (true, Some(refused)) = (planned.is_empty(), refused.into_iter().next()) {
         return Err(refused).context("--format");
     }
-    let planned: Vec<File> = planned.into_iter().chain(args.solve.planned(&stem)).collect();
+    let timing = args.solve.estimate_timing.then(|| compensation::planned(&stem));
+    let planned = planned.into_iter().chain(args.solve.planned(&stem)).chain(timing);
+    let planned: Vec<File> = planned.collect();
     check_places(folder, &planned, args.overwrite)?;
     let page = args.solve.page(&stem, args.overwrite)?;
     args.solve.covariance.check(args.overwrite, &[path.with_extension("json")])?;
     let measure = args.solve.measures_target();
-    let Sightings { calibration, views, printed, empty, left_out, print, unnamed, .. } =
-        args.sightings.read(&intrinsics, measure)?;
+    let Sightings { calibration, views, printed, empty, left_out, print, detections, unnamed } =
+        args.sightings.read(&intrinsics, measure, args.solve.estimate_timing)?;
+    let frames = args.solve.estimate_timing.then(|| args.sightings.all_frames(&detections));
+    let frames = frames.transpose()?;
     let targets: Vec<Target> = printed.iter().map(|one| one.target.clone()).collect();
     if let (Some(known), false) = (&args.fixed_intrinsics, targets.is_empty()) {
         let is_assumed = args.sightings.assumes_target();
@@ -108,9 +113,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut calibration = calibration.camera(&stem, views, intrinsics);
     calibration.set_constraints(0, constraints);
     let model = args.model.unwrap_or(ModelChoice::Auto);
-    let tried = model.choose(&mut calibration, 0, &candidates)?;
-    let listed = chosen(&tried);
-    let mut solved = args.solve.solve(calibration, print, vec![tried])?;
+    let prepared =
+        prepare(&mut calibration, model, &candidates, &[String::new()], frames.as_ref())?;
+    let listed = chosen(&prepared.tried[0]) + &prepared.describe();
+    let timing = prepared.file(&stem);
+    let mut solved = args.solve.solve(calibration, print, prepared.tried)?;
     unnamed.iter().for_each(|note| log!("{note}"));
     ensure!(!solved.estimate.frames.is_empty(), "no view is consistent with this camera");
     let of_test = solved.estimate.held_out.iter().flat_map(|test| &test.excluded);
@@ -137,7 +144,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         (files, refused) =
             args.files(&stem, (&camera.camera, Some(camera)), of_camera, &views, &json);
     }
-    files.extend(solved.measured(&stem, printed.first()));
+    files.extend(solved.measured(&stem, printed.first()).into_iter().chain(timing));
     let mut written = write_all(folder, &files, args.overwrite)?;
     if let Some(page) = page {
         solved.write_page(&page, &stem, &[args.images.as_deref()], args.overwrite)?;

@@ -3,12 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, anyhow, bail, ensure};
 
+use super::compensation::{self, AllFrames, prepare, times_ns};
+use super::detection_files::is_same;
+use super::filming::{self, Given};
 use super::report_page::check_images;
-use super::rig_cameras::{CamerasArgs, Source, check_named, named};
-use super::sightings;
-use super::sightings::{GridArgs, SheetArgs};
+use super::rig_cameras::{CamerasArgs, Source, check_named, follow, named};
+use super::sightings::{self, GridArgs, SheetArgs, check_every};
 use super::solving::{
     Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out,
     projection_uncertainty, richest, sample, with_constraints, within, without_outliers,
@@ -31,6 +33,7 @@ use deltille::export::calibration::Print;
 use deltille::export::camera::FormatError;
 use deltille::export::{RIG_FORMATS, RigFile, RigFormat, rig, saved};
 use deltille::layout::Printing;
+use deltille::limits::Limits;
 use deltille::report::target_map_svg;
 use deltille::targets::Target;
 use deltille_core::words::counted;
@@ -107,7 +110,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let page = args.solve.page("rig", args.overwrite)?;
     let mut calibration = Calibration::of(&reference, panels).refine_panels(args.refine_target);
     let (mut left_out, mut ink, mut seen) = (Vec::new(), Vec::new(), Vec::new());
-    let given = args.cameras.read(&sources, &reference, &cameras, &limits)?;
+    let (given, mut times) = (args.given(&sources, &reference, &cameras, &limits)?, Vec::new());
     for ((Source { name, option, .. }, given), intrinsics) in sources.iter().zip(given).zip(cameras)
     {
         let read = sightings::views_of(given, &reference, args.assume_target);
@@ -115,6 +118,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let sightings::Read { mut views, left_out: out, ink: of_camera, detections, .. } =
             read.with_context(|| option.clone())?;
         check_own(option, &detections, &seen)?;
+        if args.solve.estimate_timing {
+            let times_ns = times_ns(&detections).with_context(|| option.clone());
+            times.push(times_ns.context("--estimate-timing")?);
+        }
         seen.push((name, detections));
         let of_camera_out = |out: Vec<Excluded>| {
             out.into_iter().map(|out| Excluded { camera: Some(name.clone()), ..out })
@@ -134,17 +141,18 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let camera = CameraViews { constraints, ..CameraViews::new(name, views, intrinsics) };
         calibration = calibration.with(camera);
     }
-    let (mut tried, mut text) = (Vec::new(), String::new());
-    for (index, Source { name, option, .. }) in sources.iter().enumerate() {
-        let of_camera = args.model.choose(&mut calibration, index, &candidates);
-        let of_camera = of_camera.with_context(|| option.clone())?;
-        if !of_camera.is_empty() {
-            text += &format!("{name}:\n{}", chosen(&of_camera));
-        }
-        tried.push(of_camera);
-    }
+    let frames = args.solve.estimate_timing.then(|| AllFrames {
+        times_ns: times,
+        most: args.cameras.views.unwrap_or(filming::VIEWS) as usize,
+    });
+    let options: Vec<String> = sources.iter().map(|source| source.option.clone()).collect();
+    let prepared = prepare(&mut calibration, args.model, &candidates, &options, frames.as_ref())?;
+    let listed = names.iter().zip(&prepared.tried).filter(|(_, tried)| !tried.is_empty());
+    let listed = listed.map(|(name, tried)| format!("{name}:\n{}", chosen(tried)));
+    let mut text = listed.collect::<String>() + &prepared.describe();
+    let timing = prepared.file("rig");
     let print = Print { scale: sheet.print_scale, ink: InkEstimate::of_all(&ink) };
-    let mut solved = args.solve.solve(calibration, print, tried)?;
+    let mut solved = args.solve.solve(calibration, print, prepared.tried)?;
     let detections = seen.iter().flat_map(|(_, detections)| detections);
     if let (Some(note), false) = (sightings::unnamed(detections, &reference), args.assume_target) {
         log!("{note}");
@@ -165,7 +173,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let cameras = estimate.cameras.iter();
     let cameras = cameras.map(|c| (c.name.as_str(), &c.camera, c.camera_from_rig));
     let cameras = cameras.collect::<Vec<_>>();
-    let (files, refused) = args.files(&cameras, &json, estimate, &printed)?;
+    let (mut files, refused) = args.files(&cameras, &json, estimate, &printed)?;
+    files.extend(timing);
     let mut written = write_all(&args.output, &files, args.overwrite)?;
     if let Some(page) = page {
         let folders: Vec<_> = names.iter().map(|name| of_name(&args.images, name)).collect();
@@ -208,6 +217,26 @@ impl Args {
         Ok(known.unwrap_or(Intrinsics::Unknown(richest(candidates))))
     }
 
+    /// Returns the detections of each camera.
+    fn given(
+        &self,
+        sources: &[Source],
+        reference: &Reference,
+        cameras: &[Intrinsics],
+        limits: &Limits,
+    ) -> anyhow::Result<Vec<Given>> {
+        if !self.solve.estimate_timing {
+            return self.cameras.read(sources, reference, cameras, limits);
+        }
+        let given = match reference {
+            Reference::Scene(_) => {
+                Err(anyhow!("the path of one target is needed; give one --target"))
+            }
+            _ => check_every(self.cameras.every).and_then(|()| follow(sources, reference, limits)),
+        };
+        given.context("--estimate-timing")
+    }
+
     /// Returns the models that are compared.
     fn candidates(&self, names: &[&str]) -> Vec<Model> {
         self.model.candidates(|camera| {
@@ -231,7 +260,8 @@ impl Args {
         let mut found = Estimate::default();
         found.map = self.solve.measures_target().then(|| TargetMap::new(Vec::new(), [0.0; 2]));
         let json = sample_of(rig::SCHEMA);
-        let (files, _) = self.files(&cameras.collect::<Vec<_>>(), &json, &found, printed)?;
+        let (mut files, _) = self.files(&cameras.collect::<Vec<_>>(), &json, &found, printed)?;
+        files.extend(self.solve.estimate_timing.then(|| compensation::planned("rig")));
         check_places(&self.output, &files, self.overwrite)
     }
 
@@ -313,7 +343,7 @@ pub fn check_own(
 ) -> anyhow::Result<()> {
     for (other, theirs) in others {
         let is_theirs = |own: &&(String, Detection)| {
-            theirs.iter().any(|(_, of_other)| sightings::is_same(&own.1, of_other))
+            theirs.iter().any(|(_, of_other)| is_same(&own.1, of_other))
         };
         if let Some((picture, _)) = detections.iter().find(is_theirs) {
             bail!("{option}: {picture} has the same corners as an image of {other}");

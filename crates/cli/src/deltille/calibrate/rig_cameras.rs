@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail, ensure};
 
+use super::detection_files;
 use super::filming::{self, Film, FilmCamera, Given};
-use super::sightings;
 use crate::deltille::files::images::Images;
 use crate::values::whole;
 use deltille::calibrate::{Intrinsics, Model, Reference};
@@ -191,7 +191,7 @@ impl CamerasArgs {
 /// Reads the detections of each camera.
 fn detections(sources: &[Source], limits: &Limits) -> anyhow::Result<Vec<Given>> {
     let given = sources.iter().map(|source| {
-        let given = sightings::given(std::slice::from_ref(&source.path), limits);
+        let given = detection_files::given(std::slice::from_ref(&source.path), limits);
         given.with_context(|| source.option.clone())
     });
     given.collect()

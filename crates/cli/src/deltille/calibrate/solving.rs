@@ -47,6 +47,10 @@ pub struct SolveArgs {
     /// Also estimate the position of every target corner, and write a measured target
     #[arg(long, conflicts_with_all = ["shape", "board_shape"])]
     measure_target: bool,
+    /// The target moves in the recording: also estimate the readout of rolling shutters, and of a rig the offsets and drifts of the
+    /// clocks, from all frames; compensate the corners for what is significant, and write <stem>-timing.json
+    #[arg(long)]
+    pub estimate_timing: bool,
     /// Standard uncertainty per axis of the corner positions in the description, such as 0.05mm, or 0 for an exact
     /// board. It contributes to the standard deviations reported as observed [default: that of a
     /// measured target, otherwise 0.1 mm, at most 0.5 % of an edge]
