@@ -22,26 +22,32 @@ fn a_camera_and_a_rig_are_accepted_by_their_errors_of_length() {
     let rig = "--camera left=rig/left --camera right=rig/right";
     done(at, &format!("rig {rig} --target board.json --board-accuracy 0 -o ."));
 
+    for (name, row) in [("wrong", "1,2,6,7,120,0.01"), ("none", "1,2,6,99,90,0")] {
+        let text = format!("row_a,col_a,row_b,col_b,length_mm,sd_mm\n{row}\n");
+        std::fs::write(at.join(format!("{name}.csv")), text).unwrap();
+    }
     let common = "--target board.json --board-accuracy 0";
     let new = "--camera left=new/left --camera right=new/right";
     for (input, method) in
         [("camera.json new/left", "plane"), (&format!("rig.json {new}"), "triangulation")]
     {
-        for (limit, verdict, code) in [("5mm+L/100", "conforms", 0), ("0.00001mm", "fails", 1)] {
-            let args = format!(
-                "accept {input} {common} --limit {limit} -o a.json --report a.html --force"
-            );
+        // The length between these corners is about 90 mm.
+        for (more, verdict, code) in
+            [("--limit 5mm+L/100", "conforms", 0), ("--limit 5mm --lengths wrong.csv", "fails", 1)]
+        {
+            let args =
+                format!("accept {input} {common} {more} -o {verdict}.json --report a.html --force");
             let result = output(at, &args);
             let text = String::from_utf8_lossy(&result.stdout).into_owned();
             assert_eq!(result.status.code(), Some(code), "{text}");
-            let found = json(&at.join("a.json"));
+            let found = json(&at.join(format!("{verdict}.json")));
             assert_eq!((&found["verdict"], &found["method"]), (&verdict.into(), &method.into()));
             assert_eq!(found["frames"], 4);
             let page = std::fs::read_to_string(at.join("a.html")).unwrap();
             assert!(page.contains("Uncertainty of the largest error"), "{page}");
         }
         // A limit within the uncertainty of the largest error, with all errors below it.
-        let found = json(&at.join("a.json"));
+        let found = json(&at.join("conforms.json"));
         let lengths = found["lengths"].as_array().unwrap();
         let of =
             |name: &'static str| lengths.iter().map(move |of| of[name].as_f64().unwrap().abs());
@@ -52,8 +58,6 @@ fn a_camera_and_a_rig_are_accepted_by_their_errors_of_length() {
         assert!(inside as f64 > 0.85 * lengths.len() as f64, "{inside} of {}", lengths.len());
     }
 
-    std::fs::write(at.join("one.csv"), "row_a,col_a,row_b,col_b,length_mm,sd_mm\n1,2,6,99,90,0\n")
-        .unwrap();
     for (args, expected) in [
         ("camera.json corners --limit 1mm".to_owned(), "were used for the calibration"),
         ("camera.yaml new/left".to_owned(), "no observed covariance"),
@@ -65,8 +69,8 @@ fn a_camera_and_a_rig_are_accepted_by_their_errors_of_length() {
             "scale from the target",
         ),
         (
-            format!("rig.json {new} --lengths one.csv"),
-            "one.csv: line 2: the target has no corner 6, 99",
+            format!("rig.json {new} --lengths none.csv"),
+            "none.csv: line 2: the target has no corner 6, 99",
         ),
     ] {
         refused(at, &format!("accept {args} {common}"), &[expected]);

@@ -25,7 +25,7 @@ use crate::output::{Overwrite, check_folder, fixed, log, say};
 use crate::run::{FAILED, report};
 use crate::values::format;
 use deltille::calibrate::{
-    Calibration, CameraViews, Estimate, Excluded, Intrinsics, Model, TargetMap,
+    Calibration, CameraViews, Estimate, Excluded, Intrinsics, Model, Reference, TargetMap,
 };
 use deltille::camera::{Camera, CameraFile, Pose};
 use deltille::detect::{Detection, InkEstimate};

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, anyhow, bail, ensure};
+use anyhow::{Context, anyhow, ensure};
 use clap::ValueEnum;
 
 use super::compensation::{AllFrames, times_ns};
@@ -180,7 +180,7 @@ impl SightingsArgs {
         let sheet = self.sheet.read(&limits, &reference.identities(), &printed)?;
         ensure!(
             !all_frames || targets.len() < 2,
-            "--estimate-timing: there are {} targets; give the one that moves",
+            "--estimate-timing: the path of one target is needed; give one --target, not {}",
             targets.len()
         );
         let (film, assume) = (&self.film, self.assume_target);
