@@ -32,6 +32,9 @@ const CANDIDATES: usize = 300;
 /// Maximum number of rounds.
 const MAX_ROUNDS: usize = 10;
 
+/// Offsets are searched in half intervals, up to this number on both sides; as with known cameras.
+const SEARCHED: i64 = 8;
+
 /// Change of the corners (RMS), in their standard deviations, below which they remain: the parameters of a camera change by
 /// less than this fraction of their standard deviations.
 const SETTLED: f64 = 0.05;
@@ -210,34 +213,45 @@ fn change<K: Ord>(before: &BTreeMap<K, DVec2>, now: &BTreeMap<K, DVec2>) -> f64 
     if count == 0 { f64::INFINITY } else { (sum / f64::from(2 * count)).sqrt() }
 }
 
-/// The pose of a camera relative to the first one, from views next to each other in time. It is the one of a pair of views to
-/// which those of other pairs are closest, because pairs in fast motion are displaced by the offset of the clocks.
+/// The pose of a camera relative to the first one, from pairs of views next to each other in time. The offset of the clocks is
+/// searched in half intervals: with a wrong one, the poses of pairs differ by the motion in it. Of these poses, the one to which
+/// the others are closest is used.
 fn relative(first: &TimedCamera, camera: &TimedCamera, panels: &[Pose]) -> Option<Pose> {
     let intervals = first.views.windows(2).map(|two| (two[1].0 - two[0].0) as f64).collect();
-    let half_ns = median(intervals)? / 2.0;
-    let mut pairs: Vec<(&View, &View)> = Vec::new();
-    for (ns, view) in &camera.views {
-        let next = first.views.partition_point(|(other, _)| other < ns);
-        let near = first.views[next.saturating_sub(1)..].iter().take(2);
-        let nearest = near.min_by_key(|(at, _)| (at - ns).abs());
-        let nearest = nearest.filter(|(at, _)| (at - ns).abs() as f64 <= half_ns);
-        pairs.extend(nearest.map(|(_, other)| (view, other)));
-    }
-    let relative = |(view, other): &(&View, &View)| {
-        let own = estimate_pose(&camera.camera, panels, &view.sightings)?;
-        let of_first = estimate_pose(&first.camera, panels, &other.sightings)?;
-        Some((of_first.translation.length(), own.after(&of_first.inverse())))
+    let half_ns = (median(intervals)? / 2.0) as i64;
+    let pose = |of: &TimedCamera, (ns, view): &(i64, View)| {
+        Some((*ns, estimate_pose(&of.camera, panels, &view.sightings)?))
     };
-    let poses: Vec<(f64, Pose)> = evenly(&pairs, FIRST_VIEWS).filter_map(relative).collect();
-    let far = |&(distance_mm, pose): &(f64, Pose)| {
+    let path: Vec<(i64, Pose)> = first.views.iter().filter_map(|of| pose(first, of)).collect();
+    let some = evenly(&camera.views, FIRST_VIEWS).filter_map(|of| pose(camera, of));
+    let some: Vec<(i64, Pose)> = some.collect();
+    let with_offset = |halves: i64| {
+        let pair = |(ns, own): &(i64, Pose)| {
+            let ns = ns + halves * half_ns;
+            let next = path.partition_point(|(other, _)| *other < ns);
+            let near = path[next.saturating_sub(1)..].iter().take(2);
+            let (at, of_first) = near.min_by_key(|(at, _)| (at - ns).abs())?;
+            let is_near = (at - ns).abs() <= half_ns;
+            is_near.then(|| (of_first.translation.length(), own.after(&of_first.inverse())))
+        };
+        let pairs: Vec<(f64, Pose)> = some.iter().filter_map(pair).collect();
+        // A few pairs agree by chance.
+        if 2 * pairs.len() > some.len() { closest(&pairs) } else { None }
+    };
+    let found = (-SEARCHED..=SEARCHED).filter_map(with_offset);
+    found.min_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, pose)| pose)
+}
+
+/// The pose to which the others are closest, and their median distance as an angle; poses have the distance of the target, mm.
+fn closest(poses: &[(f64, Pose)]) -> Option<(f64, Pose)> {
+    let off = |&(distance_mm, pose): &(f64, Pose)| {
         let off = poses.iter().map(|(_, other)| {
             let [turn, step] = pose.off(other);
             turn.length() + step.length() / distance_mm
         });
-        median(off.collect()).unwrap_or(f64::INFINITY)
+        (median(off.collect()).unwrap_or(f64::INFINITY), pose)
     };
-    let best = poses.iter().min_by(|one, other| far(one).total_cmp(&far(other)));
-    best.map(|(_, pose)| *pose)
+    poses.iter().map(off).min_by(|one, other| one.0.total_cmp(&other.0))
 }
 
 #[cfg(test)]
