@@ -179,10 +179,12 @@ def test_acceptance(calibration, detections, board):
     assert 0 < found.probing_rms_mm < found.probing_mm
     assert json.loads(found.to_json())["verdict"] == "conforms"
     assert "<b>Conforms.</b>" in found.certificate("camera", "board")
-    one = deltille.accept(known, detections[1::2], lengths=[((1, 2), (6, 7), 100.0, 0.001)])
-    assert one.verdict is None and set(one.known_mm) == {100.0}
-    with pytest.raises(deltille.CalibrationError, match="no corner 1, 99"):
-        deltille.accept(known, detections[1::2], lengths=[((1, 2), (1, 99), 100.0, 0.001)])
+    ends = [(int(board.corner_rows[i]), int(board.corner_cols[i])) for i in (0, -1)]
+    length_mm = float(numpy.linalg.norm(board.corners[0] - board.corners[-1]))
+    one = deltille.accept(known, detections[1::2], lengths=[(*ends, length_mm, 0.001)])
+    assert one.verdict is None and set(one.known_mm) == {length_mm}
+    with pytest.raises(deltille.CalibrationError, match="no corner in row 1 and column 99"):
+        deltille.accept(known, detections[1::2], lengths=[(ends[0], (1, 99), 100.0, 0.001)])
     with pytest.raises(deltille.CalibrationError, match="used for the calibration"):
         deltille.accept(known, detections[::2])
 

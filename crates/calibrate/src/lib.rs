@@ -67,7 +67,7 @@ mod uncertainty;
 
 pub use accept::acceptance::{Acceptance, Budget, Conformity, LengthError, Probing};
 pub use accept::request::{
-    AcceptanceRequest, CornerLabel, KnownLength, Limit, NoCorner, Temperature,
+    AcceptanceRequest, CornerLabel, KnownLength, Limit, RequestError, Temperature,
 };
 pub use accept::run::AcceptanceError;
 pub use adjust::finding::{Finding, Moved, OutlierPattern};

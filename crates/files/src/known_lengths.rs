@@ -54,7 +54,13 @@ pub fn parse(text: &str) -> Result<Vec<Length>, Problem> {
         let [row, col] = ["row", "col"].map(|of| needed(&format!("{of}_{end}")));
         Ok((at(&format!("panel_{end}")), row?, col?))
     };
+    if let Some(twice) = (1..names.len()).find(|&i| names[..i].contains(&names[i])) {
+        return Err(Problem { line, text: format!("column {} appears twice", names[twice]) });
+    }
     let ends = [corner("a")?, corner("b")?];
+    if ends[0].0.is_some() != ends[1].0.is_some() {
+        return Err(Problem { line, text: "panel_a and panel_b are needed together".to_owned() });
+    }
     let (length, sd) = (needed("length_mm")?, needed("sd_mm")?);
     let read = |(line, text): (usize, &str)| {
         let values: Vec<&str> = text.split(separator).map(cell).collect();
@@ -69,10 +75,14 @@ pub fn parse(text: &str) -> Result<Vec<Length>, Problem> {
         let whole = |at: usize| parsed(names[at], values[at], "a whole number").map_err(wrong);
         let id = |at: usize| parsed(names[at], values[at], "the number of a panel").map_err(wrong);
         let mm = |at: usize, least: f64| {
-            let mm: f64 = parsed(names[at], values[at], "a number").map_err(wrong)?;
+            let mm: f64 =
+                parsed(names[at], values[at], "a number with a decimal point").map_err(wrong)?;
             match mm.is_finite() && mm >= least {
                 true => Ok(mm),
-                false => Err(wrong(format!("{}: {mm} is not at least {least}", names[at]))),
+                false => {
+                    let (name, value) = (names[at], values[at]);
+                    Err(wrong(format!("{name}: {value} is not a length of at least {least} mm")))
+                }
             }
         };
         let end = |(panel, row, col): (Option<usize>, usize, usize)| {
@@ -115,8 +125,8 @@ mod tests {
         let header = "row_a,col_a,row_b,col_b,length_mm,sd_mm";
         for (row, expected) in [
             ("0,0,1,x,10,0", "line 2: col_b: \"x\" is not a whole number"),
-            ("0,0,1,1,-10,0", "line 2: length_mm: -10 is not at least 0.001"),
-            ("0,0,1,1,10,NaN", "line 2: sd_mm: NaN is not at least 0"),
+            ("0,0,1,1,-10,0", "line 2: length_mm: -10 is not a length of at least 0.001 mm"),
+            ("0,0,1,1,10,NaN", "line 2: sd_mm: NaN is not a length of at least 0 mm"),
             ("0,0,0,0,10,0", "line 2: both ends are the same corner"),
             ("0,0,1,1,10", "line 2: 5 values, but the header has 6 columns"),
             ("", "line 1: the table contains no lengths"),

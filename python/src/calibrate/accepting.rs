@@ -15,7 +15,6 @@ use crate::see::detection::Targets;
 #[pyclass(frozen, module = "deltille")]
 pub struct Acceptance {
     found: calibrate::Acceptance,
-    temperature: Option<Temperature>,
     has_table: bool,
 }
 
@@ -69,7 +68,7 @@ impl Acceptance {
         self.found.probing.rms_mm
     }
 
-    /// Names of the images that were not used because they were used for the calibration.
+    /// Names of the images that were not measured, because their pose is that of an image of the calibration.
     #[getter]
     fn reused(&self) -> Vec<String> {
         self.found.reused.clone()
@@ -91,7 +90,6 @@ impl Acceptance {
             calibration: calibration.to_owned(),
             target: target.to_owned(),
             lengths: self.has_table.then(|| "a table".to_owned()),
-            temperature: self.temperature,
             found: &self.found,
         };
         certificate.html()
@@ -200,13 +198,11 @@ pub fn accept_of(
     };
     let length = |(from, to, length_mm, sd_mm): (End, End, f64, f64)| {
         let ends = [end(from)?, end(to)?];
-        match length_mm > 0.0 && length_mm.is_finite() && sd_mm >= 0.0 && sd_mm.is_finite() {
-            true => Ok(KnownLength { ends, length_mm, sd_mm }),
-            false => Err(wrong(
-                "lengths: expected positive lengths and their standard uncertainties, mm"
-                    .to_owned(),
-            )),
+        if !(0.0..f64::INFINITY).contains(&sd_mm) {
+            return Err(wrong("lengths: expected standard uncertainties in mm".to_owned()));
         }
+        let known = KnownLength::on(&target, ends, length_mm, sd_mm);
+        known.map_err(|error| wrong(format!("lengths: {error}")))
     };
     let lengths =
         lengths.into_iter().flatten().map(length).collect::<PyResult<Vec<KnownLength>>>()?;
@@ -219,16 +215,14 @@ pub fn accept_of(
     let limit = limit_mm.map(|constant_mm| Limit { constant_mm, per_length: limit_per_length });
     let temperature = match (temperature_c, expansion_ppm) {
         (None, None) => None,
-        (Some((celsius, sd_k)), Some((ppm, ppm_sd))) => Some(Temperature {
-            above_reference_k: celsius - Temperature::REFERENCE_C,
-            sd_k,
-            expansion_per_k: ppm * 1e-6,
-            expansion_sd_per_k: ppm_sd * 1e-6,
-        }),
+        (Some(celsius), Some(ppm_per_k)) => {
+            let temperature = Temperature::new(celsius, ppm_per_k);
+            Some(temperature.map_err(|error| wrong(error.to_string()))?)
+        }
         _ => return Err(wrong("pass temperature_c and expansion_ppm together".to_owned())),
     };
     let request = AcceptanceRequest { lengths, limit, temperature };
     let found = unlocked(py, move || views.accept(&before, &request))?;
     let found = found.map_err(|error| wrong(error.to_string()))?;
-    Ok(Acceptance { found, temperature, has_table })
+    Ok(Acceptance { found, has_table })
 }

@@ -1,6 +1,6 @@
 //! The result of an acceptance test.
 
-use super::request::{CornerLabel, Limit};
+use super::request::{AcceptanceRequest, CornerLabel};
 use deltille_core::statistics::f_p_value;
 
 /// The result of an acceptance test.
@@ -19,10 +19,14 @@ pub struct Acceptance {
     pub probing: Probing,
     /// Number of frames: images of one camera, or simultaneous images of a rig.
     pub frames: usize,
-    /// Names of the views that were not used because they were used for the calibration.
+    /// Names of frames in which no length was measured, because too few corners were seen.
+    pub unmeasured: Vec<String>,
+    /// Names of views that were not measured, because their pose is that of a view of the calibration.
     pub reused: Vec<String>,
-    /// The limit.
-    pub limit: Option<Limit>,
+    /// Standard deviation of a corner of the target per axis that was assumed, mm; zero for an exact target.
+    pub board_accuracy_mm: f64,
+    /// The terms of the test.
+    pub request: AcceptanceRequest,
 }
 
 /// A measured length.
@@ -106,6 +110,36 @@ impl Acceptance {
         self.lengths.iter().max_by(|a, b| size(a).total_cmp(&size(b)))
     }
 
+    /// The lengths in the order of their weight: those that fail, those that are undecided, then by their error with its
+    /// expanded uncertainty relative to the limit; without a limit, by their error.
+    pub fn by_weight(&self) -> Vec<&LengthError> {
+        let weight = |of: &LengthError| match self.request.limit {
+            Some(limit) => {
+                let (error, expanded) = (of.error_mm().abs(), of.budget.expanded_mm());
+                (self.conformity(of), (error + expanded) / limit.of(of.known_mm))
+            }
+            None => (None, of.error_mm().abs()),
+        };
+        let mut all: Vec<&LengthError> = self.lengths.iter().collect();
+        all.sort_by(|a, b| {
+            let [a, b] = [a, b].map(|of| weight(of));
+            b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))
+        });
+        all
+    }
+
+    /// Number of lengths with this judgement.
+    pub fn count(&self, conformity: Conformity) -> usize {
+        self.lengths.iter().filter(|of| self.conformity(of) == Some(conformity)).count()
+    }
+
+    /// Whether the lengths are on several panels.
+    pub fn has_panels(&self) -> bool {
+        let mut panels = self.lengths.iter().flat_map(|of| of.ends.map(|end| end.panel));
+        let first = panels.next();
+        panels.any(|panel| Some(panel) != first)
+    }
+
     /// Number of lengths whose error is within its expanded uncertainty.
     pub fn within(&self) -> usize {
         self.lengths.iter().filter(|of| of.error_mm().abs() <= of.budget.expanded_mm()).count()
@@ -113,7 +147,7 @@ impl Acceptance {
 
     /// The judgement of a length; `None` without a limit.
     pub fn conformity(&self, of: &LengthError) -> Option<Conformity> {
-        let limit = self.limit?.of(of.known_mm);
+        let limit = self.request.limit?.of(of.known_mm);
         let (error, expanded) = (of.error_mm().abs(), of.budget.expanded_mm());
         Some(if error + expanded <= limit {
             Conformity::Conforms
@@ -182,6 +216,7 @@ fn coverage_factor(freedom: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::request::Limit;
     use super::*;
 
     /// Values of table G.2 of the GUM.
@@ -209,11 +244,15 @@ mod tests {
             lengths,
             probing: Probing::default(),
             frames: 1,
+            unmeasured: Vec::new(),
             reused: Vec::new(),
-            limit,
+            board_accuracy_mm: 0.0,
+            request: AcceptanceRequest { limit, ..AcceptanceRequest::default() },
         };
         let each: Vec<_> = found.lengths.iter().map(|of| found.conformity(of).unwrap()).collect();
         assert_eq!(each, [Conformity::Conforms, Conformity::Undecided, Conformity::Fails]);
         assert_eq!(found.verdict(), Some(Conformity::Fails));
+        let errors: Vec<f64> = found.by_weight().iter().map(|of| of.error_mm()).collect();
+        assert!(errors[0] > 0.08 && errors[1] < 0.0, "{errors:?}");
     }
 }

@@ -29,6 +29,8 @@ pub(super) struct InPlane {
     corners: Vec<Corner>,
     /// The inverse of N.
     pose: Matrix6<f64>,
+    /// RMS residual at the pose per axis, px.
+    rms_px: f64,
 }
 
 /// The derivatives at a corner.
@@ -60,13 +62,16 @@ impl InPlane {
             pose.translation += DVec3::new(step[3], step[4], step[5]);
         }
         let (normal, _) = normal(camera, seen, &pose)?;
-        let (mut points, mut corners) = (Vec::new(), Vec::new());
+        let (mut points, mut corners, mut squares) = (Vec::new(), Vec::new(), 0.0);
         for of in seen {
+            let (at, _) = projected(camera, &pose, of.2.apply(of.1.panel_mm))?;
+            squares += of.1.pixel.distance_squared(at.pixel);
             let (point, corner) = measured(camera, of, &pose)?;
             points.push(point);
             corners.push(corner);
         }
-        Some(Self { points, corners, pose: normal.try_inverse()? })
+        let rms_px = (squares / (2 * seen.len()).max(1) as f64).sqrt();
+        Some(Self { points, corners, pose: normal.try_inverse()?, rms_px })
     }
 }
 
@@ -140,6 +145,10 @@ fn measured(
 impl Measured for InPlane {
     fn points(&self) -> &[Point] {
         &self.points
+    }
+
+    fn rms_px(&self) -> f64 {
+        self.rms_px
     }
 
     fn sensitivity(&self, ends: [usize; 2], is_known: bool) -> Sensitivity {

@@ -1,5 +1,7 @@
 //! What an acceptance test compares with.
 
+use glam::DVec3;
+
 use crate::input::panel::PanelRef;
 use deltille_core::targets::Target;
 
@@ -58,15 +60,23 @@ pub struct AcceptanceRequest {
     pub temperature: Option<Temperature>,
 }
 
-/// A corner that a target does not have.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+/// Largest difference of a known length from the description of the target, relative to it: beyond, the unit or a corner is
+/// wrong.
+const DIFFERENT: f64 = 0.02;
+
+/// Ranges of temperatures, °C, and of coefficients of expansion, ppm/K: of no use are targets beyond.
+const CELSIUS: [f64; 2] = [-60.0, 200.0];
+const PPM_PER_K: [f64; 2] = [0.0, 300.0];
+
+/// What is wrong with a request.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum NoCorner {
+pub enum RequestError {
     /// The target has several panels, and none was named.
     #[error("the target has several panels: name that of each end")]
     Panel,
     /// No panel of the target has this corner.
-    #[error("the target has no corner {row}, {col}{}", panel.map_or(String::new(), |id| format!(" on panel {id}")))]
+    #[error("the target has no corner in row {row} and column {col}{}", panel.map_or(String::new(), |id| format!(" on panel {id}")))]
     Corner {
         /// Id of the panel, if it was named.
         panel: Option<u32>,
@@ -75,6 +85,22 @@ pub enum NoCorner {
         /// Lattice column.
         col: i32,
     },
+    /// A length contradicts the target.
+    #[error(
+        "the length is {length_mm} mm, but {described_mm:.3} mm by the description of the target: check the unit and the corners"
+    )]
+    Length {
+        /// The length, mm.
+        length_mm: f64,
+        /// That of the target, mm.
+        described_mm: f64,
+    },
+    /// A temperature is out of its range.
+    #[error("{0} °C is not a temperature from {low} to {high} °C", low = CELSIUS[0], high = CELSIUS[1])]
+    Temperature(f64),
+    /// A coefficient of expansion is out of its range.
+    #[error("{0} ppm/K is not from {low} to {high} ppm/K", low = PPM_PER_K[0], high = PPM_PER_K[1])]
+    Expansion(f64),
 }
 
 impl CornerLabel {
@@ -82,16 +108,48 @@ impl CornerLabel {
     ///
     /// # Errors
     /// Returns an error if the target has no such corner.
-    pub fn on(target: &Target, panel: Option<u32>, row: i32, col: i32) -> Result<Self, NoCorner> {
+    pub fn on(
+        target: &Target,
+        panel: Option<u32>,
+        row: i32,
+        col: i32,
+    ) -> Result<Self, RequestError> {
         if panel.is_none() && target.panels.len() > 1 {
-            return Err(NoCorner::Panel);
+            return Err(RequestError::Panel);
         }
         let panels = target.panels.iter().enumerate();
         let mut panels = panels.filter(|(_, of)| panel.is_none_or(|id| id == of.id));
         let found = panels
             .find(|(_, of)| of.corners.iter().any(|corner| (corner.row, corner.col) == (row, col)));
-        let (index, of) = found.ok_or(NoCorner::Corner { panel, row, col })?;
+        let (index, of) = found.ok_or(RequestError::Corner { panel, row, col })?;
         Ok(Self { panel: PanelRef::new(index, of.id), row, col })
+    }
+
+    /// Its position on the target, mm.
+    fn on_target(&self, target: &Target) -> Option<DVec3> {
+        let corners = &target.panels.get(self.panel.index())?.corners;
+        let own = corners.iter().find(|of| (of.row, of.col) == (self.row, self.col));
+        own.map(|corner| corner.target_mm)
+    }
+}
+
+impl KnownLength {
+    /// A length on a target, with its standard uncertainty, mm.
+    ///
+    /// # Errors
+    /// Returns an error if the length differs from the description of the target by more than 2 %.
+    pub fn on(
+        target: &Target,
+        ends: [CornerLabel; 2],
+        length_mm: f64,
+        sd_mm: f64,
+    ) -> Result<Self, RequestError> {
+        let [a, b] = ends.map(|end| end.on_target(target).unwrap_or(DVec3::NAN));
+        let described_mm = a.distance(b);
+        match (length_mm / described_mm - 1.0).abs() < DIFFERENT {
+            true => Ok(Self { ends, length_mm, sd_mm }),
+            false => Err(RequestError::Length { length_mm, described_mm }),
+        }
     }
 }
 
@@ -105,6 +163,33 @@ impl Limit {
 impl Temperature {
     /// The reference temperature of lengths (ISO 1), °C.
     pub const REFERENCE_C: f64 = 20.0;
+
+    /// The temperature of a target, °C, and its coefficient of linear expansion, ppm/K, each with its standard uncertainty.
+    ///
+    /// # Errors
+    /// Returns an error if one of them is out of its range.
+    pub fn new(celsius: (f64, f64), ppm_per_k: (f64, f64)) -> Result<Self, RequestError> {
+        let is_within = |(value, sd): (f64, f64), [low, high]: [f64; 2]| {
+            (low..=high).contains(&value) && (0.0..high - low).contains(&sd)
+        };
+        if !is_within(celsius, CELSIUS) {
+            return Err(RequestError::Temperature(celsius.0));
+        }
+        if !is_within(ppm_per_k, PPM_PER_K) {
+            return Err(RequestError::Expansion(ppm_per_k.0));
+        }
+        Ok(Self {
+            above_reference_k: celsius.0 - Self::REFERENCE_C,
+            sd_k: celsius.1,
+            expansion_per_k: ppm_per_k.0 * 1e-6,
+            expansion_sd_per_k: ppm_per_k.1 * 1e-6,
+        })
+    }
+
+    /// The temperature, °C.
+    pub fn celsius(&self) -> f64 {
+        Self::REFERENCE_C + self.above_reference_k
+    }
 
     /// The relative expansion of the target, and its standard uncertainty.
     pub(super) fn strain(&self) -> (f64, f64) {

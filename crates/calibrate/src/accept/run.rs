@@ -19,9 +19,12 @@ use crate::start::pose::{estimate_pose, median_off_px};
 use crate::uncertainty::board_errors::{SHEET, accuracy, sheets};
 use deltille_core::camera::Pose;
 
-/// A view was used for the calibration if it has the name of one of its views, and the pose of that view fits it with a median
-/// residual below this number of RMS residuals.
+/// A view repeats one of the calibration if the pose of that view fits it with a median residual below this number of its RMS
+/// residuals.
 const SAME: f64 = 2.0;
+
+/// Largest RMS residual of measured corners in a frame, relative to the longer side of the image; as in a check.
+const FITS: f64 = 0.005;
 
 /// Why an acceptance test is not possible.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -29,32 +32,71 @@ const SAME: f64 = 2.0;
 pub enum AcceptanceError {
     /// The calibration has no observed covariance.
     #[error(
-        "the calibration has no observed covariance, so that the uncertainty of lengths is not known: calibrate with at least \
-         ten views, and with another model than spline"
+        "no observed covariance, so that the uncertainty of lengths is not known: give the .json of a calibration from several \
+         views, with estimated cameras"
     )]
     Uncertainty,
+    /// A view has another size than the camera.
+    #[error(
+        "{image} has {} × {} px, but the camera was calibrated at {} × {} px: lengths can be measured only at the same size",
+        size_px[0],
+        size_px[1],
+        camera_px[0],
+        camera_px[1]
+    )]
+    Size {
+        /// The image.
+        image: String,
+        /// Its width and height, px.
+        size_px: [u32; 2],
+        /// Those of the camera, px.
+        camera_px: [u32; 2],
+    },
+    /// Measured corners do not project to where they were seen.
+    #[error(
+        "{frame}: measured corners are {rms_px:.1} px off (RMS): check that the photographs are those of {}, and that the target \
+         is right",
+        match is_rig {
+            true => "their cameras, that those of the same name were taken at the same time",
+            false => "the camera",
+        }
+    )]
+    Fit {
+        /// The frame.
+        frame: String,
+        /// RMS residual per axis, px.
+        rms_px: f64,
+        /// Whether corners are triangulated.
+        is_rig: bool,
+    },
     /// One camera takes the scale from the target.
     #[error(
         "one camera takes the scale from the target, so that its expansion has no effect: omit the temperature and the expansion"
     )]
     Temperature,
-    /// All views were used for the calibration.
-    #[error("all {views} views were used for the calibration: take other photographs")]
+    /// The poses of all views are those of views of the calibration.
+    #[error(
+        "all {views} views were used for the calibration, or repeat their poses: take other photographs"
+    )]
     Reused {
         /// Number of views.
         views: usize,
     },
-    /// No frame measures two corners.
+    /// No frame measures a length.
     #[error(
         "no lengths were measured: {}",
-        match is_rig {
-            true => "two cameras must see the same corners at the same time",
-            false => "each photograph must show six or more corners",
+        match (is_rig, are_known) {
+            (true, false) => "two cameras must see six or more of the same corners at the same time",
+            (false, false) => "each photograph must show six or more corners",
+            (true, true) => "two cameras must see both ends of a given length at the same time",
+            (false, true) => "a photograph must show both ends of a given length",
         }
     )]
     NoLengths {
         /// Whether corners are triangulated.
         is_rig: bool,
+        /// Whether lengths were given.
+        are_known: bool,
     },
 }
 
@@ -101,6 +143,7 @@ impl Calibration {
         if request.temperature.is_some() && !is_triangulated {
             return Err(AcceptanceError::Temperature);
         }
+        self.check_sizes(before)?;
         let (views, reused) = self.new_views(before);
         let count = views.values().map(Vec::len).sum::<usize>();
         if count == 0 && !reused.is_empty() {
@@ -112,9 +155,13 @@ impl Calibration {
             lengths: Vec::new(),
             probing: Probing::default(),
             frames: 0,
+            unmeasured: Vec::new(),
             reused,
-            limit: request.limit,
+            board_accuracy_mm: test.target.accuracy_mm,
+            request: request.clone(),
         };
+        let sides = before.cameras.iter().map(|of| of.camera.width.max(of.camera.height));
+        let side = f64::from(sides.max().unwrap_or(0));
         let mut squares = 0.0;
         for (name, views) in &views {
             let measured: Option<Box<dyn Measured>> = match is_triangulated {
@@ -122,17 +169,35 @@ impl Calibration {
                 false => test.in_plane(&views[0].1).map(|of| Box::new(of) as _),
             };
             let Some(measured) = measured.filter(|of| of.points().len() >= MIN_CORNERS) else {
+                found.unmeasured.push(name.clone());
                 continue;
             };
+            let rms_px = measured.rms_px();
+            if rms_px.is_nan() || rms_px > FITS * side {
+                let frame = name.clone();
+                return Err(AcceptanceError::Fit { frame, rms_px, is_rig: is_triangulated });
+            }
             found.frames += 1;
             found.lengths.extend(test.lengths(name, measured.as_ref()));
             squares += found.probing.add(name, measured.points(), is_triangulated);
         }
         if found.lengths.is_empty() {
-            return Err(AcceptanceError::NoLengths { is_rig: is_triangulated });
+            let are_known = !request.lengths.is_empty();
+            return Err(AcceptanceError::NoLengths { is_rig: is_triangulated, are_known });
         }
         found.probing.rms_mm = (squares / found.probing.corners as f64).sqrt();
         Ok(found)
+    }
+
+    fn check_sizes(&self, before: &Estimate) -> Result<(), AcceptanceError> {
+        for (of, known) in self.cameras.iter().zip(&before.cameras) {
+            let camera_px = [known.camera.width, known.camera.height];
+            if let Some(view) = of.views.iter().find(|view| view.size_px != camera_px) {
+                let (image, size_px) = (view.image.clone(), view.size_px);
+                return Err(AcceptanceError::Size { image, size_px, camera_px });
+            }
+        }
+        Ok(())
     }
 
     /// The new views, and the names of those that were used for the calibration.
@@ -141,8 +206,7 @@ impl Calibration {
         let panels = self.panel_poses();
         for (index, (of, known)) in self.cameras.iter().zip(&before.cameras).enumerate() {
             for view in &of.views {
-                let mut earlier = known.views.iter().filter(|of| of.image == view.image);
-                let is_used = earlier.any(|of| {
+                let is_used = known.views.iter().any(|of| {
                     let off_px = median_off_px(&known.camera, &panels, &view.sightings, &of.pose);
                     off_px < SAME * of.rms_px
                 });

@@ -47,6 +47,9 @@ pub(super) struct Sensitivity {
 pub(super) trait Measured {
     fn points(&self) -> &[Point];
 
+    /// RMS residual of the corners in the images per axis, px.
+    fn rms_px(&self) -> f64;
+
     /// The sensitivity of the length between two points, by their indices. If the length is known otherwise, the offsets of its
     /// ends from the description of the target are not errors of it.
     fn sensitivity(&self, ends: [usize; 2], is_known: bool) -> Sensitivity;

@@ -32,6 +32,8 @@ pub(super) struct Triangulated {
     /// For each point: covariances from noise and from other errors, mm², and the derivatives with respect to the cameras.
     covariances: Vec<[Matrix3<f64>; 2]>,
     by_cameras: Vec<Matrix3xX<f64>>,
+    /// Sum of the squares of the residuals, px², and their number.
+    residuals: (f64, f64),
     /// For each panel, by its index, the rotation from its frame to that of the target.
     panels: Vec<DMat3>,
 }
@@ -39,7 +41,13 @@ pub(super) struct Triangulated {
 impl Triangulated {
     pub(super) fn new(panels: &[Pose]) -> Self {
         let panels = panels.iter().map(|pose| DMat3::from_quat(pose.rotation)).collect();
-        Self { points: Vec::new(), covariances: Vec::new(), by_cameras: Vec::new(), panels }
+        Self {
+            points: Vec::new(),
+            covariances: Vec::new(),
+            by_cameras: Vec::new(),
+            residuals: (0.0, 0.0),
+            panels,
+        }
     }
 
     /// Adds a corner of the target at `known`, near `start` in the frame of the rig; `unknowns` counts those of all cameras.
@@ -64,11 +72,12 @@ impl Triangulated {
             let step = normal.try_inverse()? * right;
             at += DVec3::new(step.x, step.y, step.z);
         }
-        let mut normal = Matrix3::zeros();
+        let (mut normal, mut squares) = (Matrix3::zeros(), 0.0);
         let (mut noise, mut other) = (Matrix3::zeros(), Matrix3::zeros());
         let mut across = Matrix3xX::zeros(unknowns);
         for image in images {
-            let (_, by_point, by_camera) = image.linear(at)?;
+            let (off, by_point, by_camera) = image.linear(at)?;
+            squares += off.norm_squared();
             let pull = by_point.transpose() * image.variances.information()?;
             normal += pull * by_point;
             noise += pull * image.variances.noise * pull.transpose();
@@ -77,6 +86,8 @@ impl Triangulated {
             columns += pull * by_camera;
         }
         let inverse = normal.try_inverse()?;
+        self.residuals.0 += squares;
+        self.residuals.1 += 2.0 * images.len() as f64;
         self.points.push(Point { label, known, measured: at });
         self.covariances.push([noise, other].map(|of| inverse * of * inverse));
         self.by_cameras.push(-(inverse * across));
@@ -110,6 +121,10 @@ impl Image<'_> {
 impl Measured for Triangulated {
     fn points(&self) -> &[Point] {
         &self.points
+    }
+
+    fn rms_px(&self) -> f64 {
+        (self.residuals.0 / self.residuals.1).sqrt()
     }
 
     fn sensitivity(&self, [a, b]: [usize; 2], is_known: bool) -> Sensitivity {

@@ -21,8 +21,6 @@ pub struct Certificate<'a> {
     pub target: String,
     /// The table of measured lengths; `None` if those of the target's description were measured.
     pub lengths: Option<String>,
-    /// The temperature of the target, if it was given.
-    pub temperature: Option<Temperature>,
     /// The result.
     pub found: &'a Acceptance,
 }
@@ -43,9 +41,9 @@ impl Certificate<'_> {
         page += &verdict(found);
         page += "<h2>Errors of length measurement</h2>";
         page += &length_errors::plot(found);
-        page += &largest(found);
+        page += &decisive(found);
         page += "<div class=\"sides\"><section>";
-        page += &found.largest().map_or(String::new(), budget);
+        page += &found.by_weight().first().map_or(String::new(), |of| budget(of));
         page += "</section><section>";
         page += &probing(found);
         page += &self.method();
@@ -66,10 +64,12 @@ impl Certificate<'_> {
             true => counted(found.frames, "set") + " of simultaneous images",
             false => counted(found.frames, "image"),
         };
+        let corners = counted(found.probing.corners, "measured corner");
+        let images = format!("{frames}, {corners}{}", out(found));
         let mut rows = vec![
             ("Calibration", self.calibration.clone()),
-            ("Target", self.target.clone()),
-            ("Images", format!("{frames}, {}", counted(found.probing.corners, "measured corner"))),
+            ("Target", format!("{}; corners ± {} mm (1σ)", self.target, found.board_accuracy_mm)),
+            ("Images", images),
         ];
         let known = match &self.lengths {
             Some(file) => format!("{}, known from {file}", counted(found.lengths.len(), "length")),
@@ -78,26 +78,27 @@ impl Certificate<'_> {
             }
         };
         rows.push(("Lengths", known));
-        if let Some(of) = &self.temperature {
+        if let Some(of) = &found.request.temperature {
             let text = format!(
-                "{:.1} ± {:.1} K above the reference temperature (1σ), expansion {:.1} ± {:.1} ppm/K",
-                of.above_reference_k,
-                of.sd_k,
-                of.expansion_per_k * 1e6,
-                of.expansion_sd_per_k * 1e6
+                "{} ± {} °C (lengths known at {} °C), expansion {} ± {} ppm/K",
+                plain(of.celsius()),
+                plain(of.sd_k),
+                Temperature::REFERENCE_C,
+                plain(of.expansion_per_k * 1e6),
+                plain(of.expansion_sd_per_k * 1e6)
             );
-            rows.push(("Temperature", text));
+            rows.push(("Temperature, 1σ", text));
         }
-        if let Some(limit) = found.limit {
+        if let Some(limit) = found.request.limit {
             let per = match limit.per_length > 0.0 {
                 true => format!(" + L / {:.0}", 1.0 / limit.per_length),
                 false => String::new(),
             };
             rows.push(("Limit of the error", format!("{} mm{per}", limit.constant_mm)));
         }
-        let rows = rows
-            .into_iter()
-            .map(|(name, value)| format!("<tr><th>{name}</th><td>{}</td></tr>", escaped(&value)));
+        let rows = rows.into_iter().map(|(name, value)| {
+            format!("<tr><th>{name}</th><td class=\"long\">{}</td></tr>", escaped(&value))
+        });
         format!("<table class=\"head\">{}</table>", rows.collect::<String>())
     }
 
@@ -122,12 +123,28 @@ impl Certificate<'_> {
         };
         format!(
             "<h2>Method</h2><p class=\"note\">{how}{lines} Uncertainties follow the GUM; conformity is judged by \
-             ISO 14253-1. The images took no part in the calibration.</p>"
+             ISO 14253-1. Images with the pose of an image of the calibration are not measured.</p>"
         )
     }
 }
 
-/// The judgement, and the largest error.
+/// The images that were not measured.
+fn out(found: &Acceptance) -> String {
+    let all = [
+        (found.reused.len(), "with the pose of an image of the calibration"),
+        (found.unmeasured.len(), "with too few corners"),
+    ];
+    let all = all.into_iter().filter(|(count, _)| *count > 0);
+    all.map(|(count, why)| format!("; not measured: {count} {why}")).collect()
+}
+
+/// A number as it was given.
+fn plain(value: f64) -> String {
+    let text = format!("{value:.6}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// The judgement, and the decisive error.
 fn verdict(found: &Acceptance) -> String {
     let (class, text) = match found.verdict() {
         Some(Conformity::Conforms) => (
@@ -144,39 +161,57 @@ fn verdict(found: &Acceptance) -> String {
         ),
         None => ("none", "<b>Measured.</b> No limit was given."),
     };
-    let largest = found.largest().map_or(String::new(), |of| {
+    let decisive = found.by_weight().first().map_or(String::new(), |of| {
         let mm = Places::of(of);
+        let (which, limit) = match found.request.limit {
+            Some(limit) => ("Decisive", format!(", limit {} mm", mm.text(limit.of(of.known_mm)))),
+            None => ("Largest", String::new()),
+        };
         format!(
-            " Largest error: {} mm at {:.1} mm, expanded uncertainty {} mm.",
+            " {which} error: {} mm at {:.1} mm, expanded uncertainty {} mm{limit}.",
             mm.signed(of.error_mm()),
             of.known_mm,
             mm.text(of.budget.expanded_mm())
         )
     });
-    format!("<p class=\"verdict {class}\">{text}{largest}</p>")
+    let counts = found.verdict().map_or(String::new(), |_| {
+        let all = [Conformity::Conforms, Conformity::Undecided, Conformity::Fails];
+        let [conforms, undecided, fails] = all.map(|of| found.count(of));
+        format!(" {conforms} lengths conform, {undecided} are undecided, {fails} do not conform.")
+    });
+    format!("<p class=\"verdict {class}\">{text}{counts}{decisive}</p>")
 }
 
-/// The lengths with the largest errors.
-fn largest(found: &Acceptance) -> String {
-    let mut lengths: Vec<&LengthError> = found.lengths.iter().collect();
-    lengths.sort_by(|a, b| b.error_mm().abs().total_cmp(&a.error_mm().abs()));
-    let has_panels = lengths.iter().any(|of| of.ends[0].panel != lengths[0].ends[0].panel);
-    let mut text = "<table><tr><th>Largest errors: image</th><th>from – to (row, column)</th><th class=\"number\">known mm</th>\
-                    <th class=\"number\">measured mm</th><th class=\"number\">error mm</th><th class=\"number\">U mm</th>"
-        .to_owned();
-    if found.limit.is_some() {
-        text += "<th class=\"number\">limit mm</th>";
+/// The lengths that matter most.
+fn decisive(found: &Acceptance) -> String {
+    let has_panels = found.has_panels();
+    let first = if found.request.limit.is_some() {
+        "Decisive lengths: image"
+    } else {
+        "Largest errors: image"
+    };
+    let place = if has_panels { "panel: row, column" } else { "row, column" };
+    let mut text = format!(
+        "<table><tr><th>{first}</th><th>from – to ({place})</th><th class=\"number\">known mm</th>\
+         <th class=\"number\">measured mm</th><th class=\"number\">error mm</th><th class=\"number\">U mm</th>"
+    );
+    if found.request.limit.is_some() {
+        text += "<th class=\"number\">limit mm</th><th></th>";
     }
     text += "</tr>";
-    for of in lengths.into_iter().take(ROWS) {
+    for of in found.by_weight().into_iter().take(ROWS) {
         let mm = Places::of(of);
-        let limit = found.limit.map_or(String::new(), |limit| {
-            format!("<td class=\"number\">{}</td>", mm.text(limit.of(of.known_mm)))
+        let limit = found.request.limit.map_or(String::new(), |limit| {
+            let verdict = found.conformity(of).map_or("", |of| of.name());
+            format!(
+                "<td class=\"number\">{}</td><td>{verdict}</td>",
+                mm.text(limit.of(of.known_mm))
+            )
         });
         let [from, to] = of.ends.map(|end| corner(&end, has_panels));
         let _ = write!(
             text,
-            "<tr><td>{}</td><td>{from} – {to}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>\
+            "<tr><td class=\"long\">{}</td><td>{from} – {to}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>\
              <td class=\"number\">{}</td><td class=\"number\">{}</td>{limit}</tr>",
             escaped(&of.frame),
             mm.text(of.known_mm),
@@ -196,7 +231,7 @@ fn largest(found: &Acceptance) -> String {
     text
 }
 
-/// The budget of the largest error.
+/// The budget of an error.
 fn budget(of: &LengthError) -> String {
     let mm = Places::of(of);
     let budget = &of.budget;
@@ -208,14 +243,16 @@ fn budget(of: &LengthError) -> String {
         ("Temperature", budget.temperature_mm),
     ];
     let row = |(name, value): (&str, f64)| {
-        format!("<tr><td>{name}</td><td class=\"number\">{}</td></tr>", mm.text(value))
+        // Two digits, also of small parts.
+        let digits = places(value.max(1e-6)).min(6);
+        format!("<tr><td>{name}</td><td class=\"number\">{value:.digits$}</td></tr>")
     };
     let freedom = match budget.freedom() {
         many if many > 1000.0 => "> 1000".to_owned(),
         few => format!("{few:.0}"),
     };
     format!(
-        "<h2>Uncertainty of the largest error</h2><table><tr><th>Source</th><th class=\"number\">u mm</th></tr>{}\
+        "<h2>Uncertainty of the first of these</h2><table><tr><th>Source</th><th class=\"number\">u mm</th></tr>{}\
          <tr class=\"total\"><td>Combined u</td><td class=\"number\">{}</td></tr>\
          <tr class=\"total\"><td>Expanded U, k = {:.2} (ν {freedom})</td><td class=\"number\">{}</td></tr></table>",
         rows.map(row).concat(),
@@ -229,7 +266,8 @@ fn probing(found: &Acceptance) -> String {
     let probing = &found.probing;
     let digits = places(probing.rms_mm.max(1e-6)).min(6);
     let at = probing.at.as_ref().map_or(String::new(), |(label, frame)| {
-        format!(" (corner {} in {})", corner(label, false), escaped(frame))
+        let corner = corner(label, found.has_panels());
+        format!(" (corner {corner} in <span class=\"long\">{}</span>)", escaped(frame))
     });
     format!(
         "<h2>Probing error</h2><p>{:.digits$} mm{at}; rms {:.digits$} mm over {}.</p>",

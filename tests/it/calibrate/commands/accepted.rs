@@ -22,7 +22,11 @@ fn a_camera_and_a_rig_are_accepted_by_their_errors_of_length() {
     let rig = "--camera left=rig/left --camera right=rig/right";
     done(at, &format!("rig {rig} --target board.json --board-accuracy 0 -o ."));
 
-    for (name, row) in [("wrong", "1,2,6,7,120,0.01"), ("none", "1,2,6,99,90,0")] {
+    let corners = &target.panels[0].corners;
+    let [first, last] = [corners[0], corners[corners.len() - 1]];
+    let length = 1.018 * first.panel_mm.distance(last.panel_mm);
+    let wrong = format!("{},{},{},{},{length},0.01", first.row, first.col, last.row, last.col);
+    for (name, row) in [("wrong", wrong.as_str()), ("none", "1,4,6,99,90,0")] {
         let text = format!("row_a,col_a,row_b,col_b,length_mm,sd_mm\n{row}\n");
         std::fs::write(at.join(format!("{name}.csv")), text).unwrap();
     }
@@ -31,10 +35,11 @@ fn a_camera_and_a_rig_are_accepted_by_their_errors_of_length() {
     for (input, method) in
         [("camera.json new/left", "plane"), (&format!("rig.json {new}"), "triangulation")]
     {
-        // The length between these corners is about 90 mm.
-        for (more, verdict, code) in
-            [("--limit 5mm+L/100", "conforms", 0), ("--limit 5mm --lengths wrong.csv", "fails", 1)]
-        {
+        // The given length of 230 mm is wrong by 4 mm.
+        for (more, verdict, code) in [
+            ("--limit 5mm+L/100", "conforms", 0),
+            ("--limit 0.5mm --lengths wrong.csv", "fails", 1),
+        ] {
             let args =
                 format!("accept {input} {common} {more} -o {verdict}.json --report a.html --force");
             let result = output(at, &args);
@@ -44,7 +49,7 @@ fn a_camera_and_a_rig_are_accepted_by_their_errors_of_length() {
             assert_eq!((&found["verdict"], &found["method"]), (&verdict.into(), &method.into()));
             assert_eq!(found["frames"], 4);
             let page = std::fs::read_to_string(at.join("a.html")).unwrap();
-            assert!(page.contains("Uncertainty of the largest error"), "{page}");
+            assert!(page.contains("Uncertainty of the first of these"), "{page}");
         }
         // A limit within the uncertainty of the largest error, with all errors below it.
         let found = json(&at.join("conforms.json"));
@@ -70,7 +75,7 @@ fn a_camera_and_a_rig_are_accepted_by_their_errors_of_length() {
         ),
         (
             format!("rig.json {new} --lengths none.csv"),
-            "none.csv: line 2: the target has no corner 6, 99",
+            "none.csv: line 2: the target has no corner in row 6 and column 99",
         ),
     ] {
         refused(at, &format!("accept {args} {common}"), &[expected]);

@@ -60,14 +60,20 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let page = page.transpose()?;
     let known = args.views.known()?;
     let request = args.request(&known.printing.target, &known.limits)?;
-    let found = args.views.views(&known)?.accept(&known.before, &request);
+    let views = args.views.views(&known)?;
+    if interrupt::has_ended_input() {
+        log!("note: interrupted; nothing was written");
+        return Ok(ExitCode::from(interrupt::exit_code()));
+    }
+    let found = views.accept(&known.before, &request);
     let found = found.with_context(|| args.views.camera().display().to_string())?;
-    if !found.reused.is_empty() {
-        log!(
-            "note: not used, because they were used for the calibration: {}, such as {}",
-            counted(found.reused.len(), "image"),
-            found.reused[0]
-        );
+    for (names, why) in [
+        (&found.reused, "their pose is that of an image of the calibration"),
+        (&found.unmeasured, "too few corners were seen"),
+    ] {
+        if let Some(first) = names.first() {
+            log!("note: not measured: {}, such as {first}: {why}", counted(names.len(), "image"));
+        }
     }
     if let Some(path) = &path {
         output::write(path, acceptance::write(&found).as_bytes(), args.overwrite)?;
@@ -77,17 +83,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let certificate = Certificate {
             calibration: name(args.views.camera()),
-            target: known.printing.target.name.to_string(),
+            target: known.printing.target.identity().to_string(),
             lengths: args.lengths.as_deref().map(name),
-            temperature: request.temperature,
             found: &found,
         };
         output::write(page, certificate.html().as_bytes(), args.overwrite).context("--report")?;
     }
     output::print(&describe(&found))?;
-    if interrupt::has_ended_input() {
-        return Ok(ExitCode::from(interrupt::exit_code()));
-    }
     Ok(match found.verdict() {
         None | Some(Conformity::Conforms) => ExitCode::SUCCESS,
         Some(Conformity::Fails) => ExitCode::from(FAILED),
@@ -97,12 +99,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 impl Args {
     fn request(&self, target: &Target, limits: &Limits) -> anyhow::Result<AcceptanceRequest> {
-        let temperature = self.temperature.zip(self.expansion).map(|(celsius, ppm)| Temperature {
-            above_reference_k: celsius.0 - Temperature::REFERENCE_C,
-            sd_k: celsius.1,
-            expansion_per_k: ppm.0 * 1e-6,
-            expansion_sd_per_k: ppm.1 * 1e-6,
-        });
+        let temperature = self.temperature.zip(self.expansion);
+        let temperature =
+            temperature.map(|(celsius, ppm_per_k)| Temperature::new(celsius, ppm_per_k));
+        let temperature = temperature.transpose().context("--temperature, --expansion")?;
         let lengths = self.lengths.as_deref().map(|path| known_lengths(path, target, limits));
         let lengths = lengths.transpose().context("--lengths")?.unwrap_or_default();
         Ok(AcceptanceRequest { lengths, limit: self.limit, temperature })
@@ -123,13 +123,17 @@ fn known_lengths(
             end.with_context(|| format!("line {}", length.line))
         });
         let [a, b] = ends;
-        Ok(KnownLength { ends: [a?, b?], length_mm: length.length_mm, sd_mm: length.sd_mm })
+        let known = KnownLength::on(target, [a?, b?], length.length_mm, length.sd_mm);
+        known.with_context(|| format!("line {}", length.line))
     };
     let lengths =
         known_lengths::parse(&text).map_err(|problem| anyhow!(problem).context(show()))?;
     let lengths: anyhow::Result<Vec<KnownLength>> = lengths.into_iter().map(of).collect();
     lengths.with_context(show)
 }
+
+/// How a limit is written.
+const LIMIT: &str = "expected a length, or a length + L/N such as 0.05mm+L/2000";
 
 /// Parses a limit, such as `0.05mm+L/2000`.
 fn limit(text: &str) -> Result<Limit, String> {
@@ -140,14 +144,10 @@ fn limit(text: &str) -> Result<Limit, String> {
             let divisor =
                 divisor.and_then(|rest| rest.strip_prefix('/')?.trim().parse::<f64>().ok());
             let divisor = divisor.filter(|of| of.is_finite() && *of > 0.0);
-            (
-                constant,
-                1.0 / divisor
-                    .ok_or("expected a length, or a length + L/N such as 0.05mm+L/2000")?,
-            )
+            (constant, 1.0 / divisor.ok_or(LIMIT)?)
         }
     };
-    let constant_mm = parse_length_mm(constant).map_err(|error| error.to_string())?;
+    let constant_mm = parse_length_mm(constant).map_err(|_| LIMIT)?;
     match constant_mm > 0.0 {
         true => Ok(Limit { constant_mm, per_length }),
         false => Err("the limit must be positive".to_owned()),
@@ -156,7 +156,8 @@ fn limit(text: &str) -> Result<Limit, String> {
 
 /// Parses a value and its standard deviation, such as `24.5±0.5`; without one, it is exact.
 fn measured(text: &str) -> Result<(f64, f64), String> {
-    let (value, sd) = text.split_once('±').or_else(|| text.split_once("+-")).unwrap_or((text, "0"));
+    let (value, sd) =
+        ["±", "+/-", "+-"].iter().find_map(|sign| text.split_once(sign)).unwrap_or((text, "0"));
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
     match (number(value), number(sd)) {
         (Some(value), Some(sd)) if sd >= 0.0 => Ok((value, sd)),
@@ -169,57 +170,65 @@ fn measured(text: &str) -> Result<(f64, f64), String> {
 
 /// Describes the result, one statement per line.
 fn describe(found: &Acceptance) -> String {
-    let Some(largest) = found.largest() else { return String::new() };
-    let digits = |mm: f64| places(mm.max(1e-6)).min(6);
-    let d = digits(largest.budget.combined_mm());
-    let verdict = match found.verdict() {
-        Some(Conformity::Conforms) => "conforms: ",
-        Some(Conformity::Fails) => "does not conform: ",
-        Some(Conformity::Undecided) => "undecided: ",
-        None => "",
+    let by_weight = found.by_weight();
+    let Some(first) = by_weight.first() else { return String::new() };
+    let part = |mm: f64| format!("{mm:.*}", places(mm.max(1e-6)).min(6));
+    let d = places(first.budget.combined_mm().max(1e-6)).min(6);
+    let corner = |label: &CornerLabel| match found.has_panels() {
+        true => format!("{}, {} on panel {}", label.row, label.col, label.panel),
+        false => format!("{}, {}", label.row, label.col),
     };
-    let limit = found
-        .limit
-        .map_or(String::new(), |limit| format!(", limit {:.d$} mm", limit.of(largest.known_mm)));
-    let [from, to] = largest.ends.map(|end| format!("{}, {}", end.row, end.col));
+    let all = found.lengths.len();
+    let verdict = match found.verdict() {
+        Some(Conformity::Conforms) => format!("conforms: all {all} lengths"),
+        Some(Conformity::Fails) => {
+            format!("does not conform: {} of {all} lengths", found.count(Conformity::Fails))
+        }
+        Some(Conformity::Undecided) => {
+            format!("undecided: {} of {all} lengths", found.count(Conformity::Undecided))
+        }
+        None => counted(all, "length"),
+    };
+    let (which, limit) = match found.request.limit {
+        Some(limit) => ("decisive", format!(", limit {:.d$} mm", limit.of(first.known_mm))),
+        None => ("largest", String::new()),
+    };
+    let ([from, to], budget) = (first.ends.map(|end| corner(&end)), &first.budget);
     let mut text = format!(
-        "{verdict}largest error of {}: {:+.d$} mm, expanded uncertainty {:.d$} mm{limit} (from {from} to {to} in {}, {:.1} mm)\n",
-        counted(found.lengths.len(), "length"),
-        largest.error_mm(),
-        largest.budget.expanded_mm(),
-        largest.frame,
-        largest.known_mm
+        "{verdict}; {which} error {:+.d$} mm, expanded uncertainty {:.d$} mm{limit} (from {from} to {to} in {}, {:.1} mm)\n",
+        first.error_mm(),
+        budget.expanded_mm(),
+        first.frame,
+        first.known_mm
     );
-    let budget = &largest.budget;
-    // Writing to a String cannot fail.
-    let _ = writeln!(
-        text,
-        "its standard uncertainty: {:.d$} mm from noise, {:.d$} from lens and other errors of corners, {:.d$} from the calibration, \
-         {:.d$} from the target, {:.d$} from temperature; k = {:.2}",
+    let parts = [
         budget.noise_mm,
         budget.lens_mm,
         budget.calibration_mm,
         budget.target_mm,
         budget.temperature_mm,
+    ];
+    let [noise, lens, calibration, target, temperature] = parts.map(part);
+    // Writing to a String cannot fail.
+    let _ = writeln!(
+        text,
+        "its standard uncertainty: {noise} mm from noise, {lens} from lens and other errors of corners, {calibration} from the \
+         calibration, {target} from the target, {temperature} from temperature; k = {:.2}",
         budget.coverage_factor()
     );
+    let errors = counted(all, "error");
     let _ = writeln!(
         text,
-        "{} of {} are within their expanded uncertainty of 95 %",
-        found.within(),
-        counted(found.lengths.len(), "error")
+        "{} of {errors} are within their expanded uncertainty of 95 %",
+        found.within()
     );
     let probing = &found.probing;
-    let d = digits(probing.rms_mm);
-    let at = probing.at.as_ref().map_or(String::new(), |(label, frame)| {
-        format!(" (corner {}, {} in {frame})", label.row, label.col)
-    });
-    let _ = writeln!(
-        text,
-        "probing error: {:.d$} mm{at}; rms {:.d$} mm of {}",
-        probing.largest_mm,
-        probing.rms_mm,
-        counted(probing.corners, "corner")
-    );
+    let at = probing
+        .at
+        .as_ref()
+        .map_or(String::new(), |(label, frame)| format!(" (corner {} in {frame})", corner(label)));
+    let [largest, rms] = [probing.largest_mm, probing.rms_mm].map(part);
+    let corners = counted(probing.corners, "corner");
+    let _ = writeln!(text, "probing error: {largest} mm{at}; rms {rms} mm of {corners}");
     text
 }

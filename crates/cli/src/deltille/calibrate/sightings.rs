@@ -163,8 +163,10 @@ impl SightingsArgs {
         all_frames: bool,
     ) -> anyhow::Result<Sightings> {
         let limits = self.limits.limits();
-        let mut printed =
-            target_file::read_all_placed(&self.target, &limits).context("--target")?;
+        let mut printed = match self.target.is_empty() {
+            true => Vec::new(),
+            false => target_file::read_all_placed(&self.target, &limits).context("--target")?,
+        };
         let targets: Vec<Target> = printed.iter().map(|one| one.target.clone()).collect();
         ensure!(
             !measure_target || targets.len() < 2,

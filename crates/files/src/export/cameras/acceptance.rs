@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use deltille_calibrate::{Acceptance, CornerLabel, LengthError, Limit};
+use deltille_calibrate::{Acceptance, Conformity, CornerLabel, LengthError, Limit};
 use deltille_core::json;
 
 /// Schema and version that this crate writes.
@@ -17,10 +17,17 @@ struct AcceptanceFile<'a> {
     method: &'static str,
     confidence: f64,
     frames: usize,
-    largest: Option<LengthRecord<'a>>,
+    board_accuracy_mm: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    temperature: Option<TemperatureRecord>,
+    /// The length that decides about the verdict, or that with the largest error.
+    decisive: Option<LengthRecord<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    counts: Option<CountsRecord>,
     lengths_within_uncertainty: usize,
     probing: ProbingRecord<'a>,
     reused: &'a [String],
+    unmeasured: &'a [String],
     lengths: Vec<LengthRecord<'a>>,
 }
 
@@ -28,6 +35,21 @@ struct AcceptanceFile<'a> {
 struct LimitRecord {
     constant_mm: f64,
     per_length: f64,
+}
+
+#[derive(Serialize)]
+struct CountsRecord {
+    conforms: usize,
+    undecided: usize,
+    fails: usize,
+}
+
+#[derive(Serialize)]
+struct TemperatureRecord {
+    celsius: f64,
+    sd_k: f64,
+    expansion_ppm_per_k: f64,
+    expansion_sd_ppm_per_k: f64,
 }
 
 #[derive(Serialize)]
@@ -81,12 +103,25 @@ pub fn write(found: &Acceptance) -> String {
         schema: SCHEMA,
         verdict: found.verdict().map(|of| of.name()),
         limit: found
+            .request
             .limit
             .map(|Limit { constant_mm, per_length }| LimitRecord { constant_mm, per_length }),
         method: if found.is_triangulated { "triangulation" } else { "plane" },
         confidence: Acceptance::CONFIDENCE,
         frames: found.frames,
-        largest: found.largest().map(|of| length(found, of)),
+        board_accuracy_mm: found.board_accuracy_mm,
+        temperature: found.request.temperature.map(|of| TemperatureRecord {
+            celsius: of.celsius(),
+            sd_k: of.sd_k,
+            expansion_ppm_per_k: of.expansion_per_k * 1e6,
+            expansion_sd_ppm_per_k: of.expansion_sd_per_k * 1e6,
+        }),
+        decisive: found.by_weight().first().map(|of| length(found, of)),
+        counts: found.verdict().map(|_| CountsRecord {
+            conforms: found.count(Conformity::Conforms),
+            undecided: found.count(Conformity::Undecided),
+            fails: found.count(Conformity::Fails),
+        }),
         lengths_within_uncertainty: found.within(),
         probing: ProbingRecord {
             largest_mm: probing.largest_mm,
@@ -98,6 +133,7 @@ pub fn write(found: &Acceptance) -> String {
             corners: probing.corners,
         },
         reused: &found.reused,
+        unmeasured: &found.unmeasured,
         lengths: found.lengths.iter().map(|of| length(found, of)).collect(),
     };
     json::to_text(&file, 2)
@@ -125,7 +161,7 @@ fn length<'a>(found: &Acceptance, of: &'a LengthError) -> LengthRecord<'a> {
         freedom: Some(budget.freedom()).filter(|freedom| freedom.is_finite()),
         coverage_factor: budget.coverage_factor(),
         expanded_mm: budget.expanded_mm(),
-        limit_mm: found.limit.map(|limit| limit.of(of.known_mm)),
+        limit_mm: found.request.limit.map(|limit| limit.of(of.known_mm)),
         verdict: found.conformity(of).map(|of| of.name()),
     }
 }

@@ -15,7 +15,7 @@ const FOOT: f64 = 22.0;
 pub(in crate::report) fn plot(found: &Acceptance) -> String {
     let longest = found.lengths.iter().map(|of| of.known_mm).fold(0.0, f64::max);
     let reach = |of: &deltille_calibrate::LengthError| {
-        let limit = found.limit.map_or(0.0, |limit| limit.of(of.known_mm));
+        let limit = found.request.limit.map_or(0.0, |limit| limit.of(of.known_mm));
         (of.error_mm().abs() + of.budget.expanded_mm()).max(limit)
     };
     let highest = found.lengths.iter().map(reach).fold(f64::MIN_POSITIVE, f64::max);
@@ -33,14 +33,14 @@ pub(in crate::report) fn plot(found: &Acceptance) -> String {
         for of in &found.lengths {
             axes.dot(DVec2::new(of.known_mm, of.error_mm()), 2.0, "dot");
         }
-        if let Some(limit) = found.limit {
+        if let Some(limit) = found.request.limit {
             for sign in [-1.0, 1.0] {
                 let ends = [0.0, right].map(|x| DVec2::new(x, sign * limit.of(x)));
                 axes.line(&ends, "limit");
             }
         }
     });
-    let limit = match found.limit {
+    let limit = match found.request.limit {
         Some(_) => {
             "<line class=\"limit\" x1=\"300\" x2=\"324\" y1=\"10\" y2=\"10\"/><text x=\"330\" y=\"14\">limit</text>"
         }
