@@ -244,7 +244,7 @@ fn budget(of: &LengthError) -> String {
     ];
     let row = |(name, value): (&str, f64)| {
         // Two digits, also of small parts.
-        let digits = places(value.max(1e-6)).min(6);
+        let digits = if value > 0.0 { places(value.max(1e-6)).min(6) } else { 0 };
         format!("<tr><td>{name}</td><td class=\"number\">{value:.digits$}</td></tr>")
     };
     let freedom = match budget.freedom() {

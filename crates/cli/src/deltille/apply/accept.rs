@@ -172,7 +172,10 @@ fn measured(text: &str) -> Result<(f64, f64), String> {
 fn describe(found: &Acceptance) -> String {
     let by_weight = found.by_weight();
     let Some(first) = by_weight.first() else { return String::new() };
-    let part = |mm: f64| format!("{mm:.*}", places(mm.max(1e-6)).min(6));
+    let part = |mm: f64| match mm > 0.0 {
+        true => format!("{mm:.*}", places(mm.max(1e-6)).min(6)),
+        false => "0".to_owned(),
+    };
     let d = places(first.budget.combined_mm().max(1e-6)).min(6);
     let corner = |label: &CornerLabel| match found.has_panels() {
         true => format!("{}, {} on panel {}", label.row, label.col, label.panel),
