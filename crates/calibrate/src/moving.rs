@@ -300,9 +300,11 @@ mod tests {
             let plain = all.with_views(&[sampled(&all.cameras[0]).views]).solve().unwrap();
             let (found, timing) = all.compensated_for_timing(&times_ns, 60).unwrap();
             let estimate = found.solve().unwrap();
-            let [plain, with] = [&plain, &estimate].map(|of| squares(&of.cameras[0]));
+            let with = squares(&estimate.cameras[0]);
             let largest = |of: &[f64]| of.iter().copied().fold(0.0, f64::max);
-            assert!(largest(&plain) > 16.0 && largest(&with) < 12.0, "{plain:?} {with:?}");
+            assert!(largest(&with) < 12.0, "{with:?}");
+            // The scatter of the uncompensated views hides their bias.
+            assert!(plain.rms_px > 2.0 * estimate.rms_px, "{} {}", plain.rms_px, estimate.rms_px);
             assert!(estimate.rms_px < 1.1 * NOISE_PX, "{}", estimate.rms_px);
             let readout = timing.cameras[0].readout_s.unwrap();
             assert!((readout.value - readout_s).abs() < 4.0 * readout.sd, "{readout:?}");
@@ -314,7 +316,8 @@ mod tests {
         let (all, times_ns) = recorded(1, [[0.0; 3]; 2], 2);
         let (found, _) = all.compensated_for_timing(&times_ns, 40).unwrap();
         assert_eq!(found.cameras[0].views.len(), 40);
-        assert!(found.cameras[0].views.iter().all(|view| all.cameras[0].views.contains(view)));
+        let [before, now] = [all.positions(), found.positions()];
+        assert!(change(&before, &now) < 1e-9, "{}", change(&before, &now));
     }
 
     #[test]

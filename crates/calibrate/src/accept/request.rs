@@ -64,7 +64,7 @@ pub struct AcceptanceRequest {
 /// wrong.
 const DIFFERENT: f64 = 0.02;
 
-/// Ranges of temperatures, °C, and of coefficients of expansion, ppm/K: of no use are targets beyond.
+/// Ranges of temperatures, °C, and of coefficients of expansion, ppm/K, of usable targets.
 const CELSIUS: [f64; 2] = [-60.0, 200.0];
 const PPM_PER_K: [f64; 2] = [0.0, 300.0];
 
