@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{CALIBRATE, board, camera, done, folder, json, kinds, output, seen_whole};
+use super::{CALIBRATE, board, camera, done, folder, json, kinds, output, refused, seen_whole};
 use crate::common::page::Page;
 use crate::common::solids::cuboctahedron;
 use deltille::camera::{BrownConrady, Camera, CameraFile, Lens, Pose};
@@ -40,6 +40,15 @@ fn a_pair_with_an_upside_down_camera_is_rectified_upright() {
         }
     }
     done(at, "rig --camera first=first --camera second=second --target board.json --model radtan");
+    let pair = "--camera second=second --camera first=first --target board.json --model radtan";
+    done(at, &format!("rig {pair} --known-poses rig.json -o kept"));
+    let [before, kept] = ["rig.json", "kept/rig.json"]
+        .map(|rig| motion(&json(&at.join(rig))["cameras"][1]["camera_from_rig"]));
+    let [turn, step] = kept.off(&before.inverse());
+    assert!(turn.length() < 1e-9 && step.length() < 1e-6, "{before:?} {kept:?}");
+    let other = "rig --camera a=first --camera second=second --target board.json";
+    let expected = "--known-poses: rig.json needs a and another of the cameras";
+    refused(at, &format!("{other} --known-poses rig.json"), &[expected]);
     let said = done(at, "rectify rig.json --pair first,second -o pair");
     assert!(said.contains("a point is in the same row of both images"), "{said}");
     let pair = json(&at.join("pair/first-second.json"));

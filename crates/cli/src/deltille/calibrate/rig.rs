@@ -1,5 +1,6 @@
 //! `deltille rig`.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -25,7 +26,8 @@ use crate::output::{Overwrite, check_folder, fixed, log, say};
 use crate::run::{FAILED, report};
 use crate::values::format;
 use deltille::calibrate::{
-    Calibration, CameraViews, Estimate, Excluded, Intrinsics, Model, Reference, TargetMap,
+    Calibration, CameraEstimate, CameraViews, Estimate, Excluded, Intrinsics, Model, Reference,
+    TargetMap,
 };
 use deltille::camera::{Camera, CameraFile, Pose};
 use deltille::detect::{Detection, InkEstimate};
@@ -55,6 +57,10 @@ pub struct Args {
     /// Camera with known, fixed intrinsics, and its file
     #[arg(long, value_name = "NAME=FILE", value_parser = named)]
     known: Vec<(String, PathBuf)>,
+    /// Keep the relative poses of the cameras as in this rig, the .json of an earlier calibration; those of cameras that it does
+    /// not have are estimated
+    #[arg(long, value_name = "RIG.json")]
+    known_poses: Option<PathBuf>,
     /// Use --target even if the detections or the camera files refer to another target
     #[arg(long)]
     assume_target: bool,
@@ -100,6 +106,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let candidates = args.candidates(&names);
     let cameras = names.iter().map(|name| args.intrinsics(name, &targets, &candidates));
     let cameras = cameras.collect::<anyhow::Result<Vec<Intrinsics>>>()?;
+    let known_poses = args.known_poses(&names)?;
     args.solve.constraints.check_cameras(&names)?;
     for (name, intrinsics) in names.iter().zip(&cameras) {
         let checked = args.solve.constraints.check(name, intrinsics, &candidates);
@@ -138,7 +145,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             check_images(folder, &views)?;
         }
         let constraints = args.solve.constraints.of(name, &intrinsics);
-        let camera = CameraViews { constraints, ..CameraViews::new(name, views, intrinsics) };
+        let camera_from_rig = known_poses.get(name.as_str()).copied();
+        let camera = CameraViews::new(name, views, intrinsics);
+        let camera = CameraViews { constraints, camera_from_rig, ..camera };
         calibration = calibration.with(camera);
     }
     let frames = args.solve.estimate_timing.then(|| AllFrames {
@@ -199,6 +208,28 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 impl Args {
+    /// Returns the known poses of cameras relative to the first one, by name.
+    fn known_poses(&self, names: &[&str]) -> anyhow::Result<BTreeMap<String, Pose>> {
+        let Some(path) = &self.known_poses else { return Ok(BTreeMap::new()) };
+        let known = camera_file::read_estimate("--known-poses", path)?;
+        let of = |name: &str| known.cameras.iter().find(|camera| camera.name == name);
+        let cameras: Vec<&CameraEstimate> = names.iter().filter_map(|name| of(name)).collect();
+        let first = names.first().and_then(|name| of(name)).filter(|_| cameras.len() > 1);
+        let first = first.with_context(|| {
+            let all: Vec<&str> = known.cameras.iter().map(|of| of.name.as_str()).collect();
+            format!(
+                "--known-poses: {} needs {} and another of the cameras (its cameras: {})",
+                path.display(),
+                names.first().unwrap_or(&"a camera"),
+                all.join(", ")
+            )
+        })?;
+        let rig_from_first = first.camera_from_rig.inverse();
+        let pose =
+            |of: &&CameraEstimate| (of.name.clone(), of.camera_from_rig.after(&rig_from_first));
+        Ok(cameras.iter().map(pose).collect())
+    }
+
     /// Returns the intrinsics of a camera.
     fn intrinsics(
         &self,
