@@ -120,12 +120,9 @@ impl Acceptance {
             }
             None => (None, of.error_mm().abs()),
         };
-        let mut all: Vec<&LengthError> = self.lengths.iter().collect();
-        all.sort_by(|a, b| {
-            let [a, b] = [a, b].map(|of| weight(of));
-            b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))
-        });
-        all
+        let mut all: Vec<_> = self.lengths.iter().map(|of| (weight(of), of)).collect();
+        all.sort_by(|(a, _), (b, _)| b.0.cmp(&a.0).then(b.1.total_cmp(&a.1)));
+        all.into_iter().map(|(_, of)| of).collect()
     }
 
     /// Number of lengths with this judgement.
