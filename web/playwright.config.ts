@@ -11,11 +11,10 @@ export default defineConfig({
   expect: { timeout: 20_000 },
   workers: 2,
   fullyParallel: true,
-  // Timing tests run alone.
   projects: [
     { name: "journeys", testMatch: "journeys.spec.ts" },
-    { name: "times", testMatch: "times.spec.ts", dependencies: ["journeys"], fullyParallel: false },
-    { name: "redraw", testMatch: "redraw.spec.ts", dependencies: ["times"] },
+    // Alone: it measures the memory of the whole browser.
+    { name: "webcam", testMatch: "webcam.spec.ts", dependencies: ["journeys"] },
   ],
   outputDir: "test-results/out",
   globalSetup: "./tests/pictures.ts",
