@@ -25,6 +25,9 @@ use crate::see::detection::Targets;
 use crate::see::pose::Pose;
 use crate::targets::target::Target;
 
+/// Standard deviations of a rotation (rad), and of a position across and along the line of sight (mm).
+type PoseSd = (f64, f64, f64);
+
 /// A calibrated camera with its diagnoses.
 #[pyclass(frozen, extends = CalibratedCamera, module = "deltille")]
 pub struct Calibration;
@@ -102,6 +105,40 @@ macro_rules! whole {
                     })
                 });
                 data.map(|data| record(py, &data)).transpose()
+            }
+
+            /// Uncertainty (1σ) of the pose of a target that the calibrated camera or rig estimates.
+            ///
+            /// Parameters
+            /// ----------
+            /// target : Target
+            ///     The target; it need not be that of the calibration.
+            /// distance_mm : float
+            ///     Distance of its centre from the camera, mm.
+            /// camera : str, optional
+            ///     The camera that sees the target; by default the first one. Other cameras of a rig contribute where they see the
+            ///     target too.
+            ///
+            /// Returns
+            /// -------
+            /// tuple of two tuples of three floats, or None
+            ///     Standard deviations of the rotation (rad, RMS of three axes), and of the position of the centre across (RMS of two
+            ///     directions) and along the line of sight (mm): from the calibration; and from noise of the pixels, for each px of noise
+            ///     per coordinate. RMS values over the positions at which the whole target is in the image, tilted by 30°.
+            ///     ``None`` if not known, or if there are no such positions.
+            #[pyo3(signature = (target, distance_mm, camera=None))]
+                    fn target_pose_sd(
+                $self: $kind,
+                target: &Target,
+                distance_mm: f64,
+                camera: Option<&str>,
+            ) -> PyResult<Option<(PoseSd, PoseSd)>> {
+                let distance_mm = arrays::distance(Some(distance_mm))?.unwrap_or_default();
+                let camera = camera.map_or(Ok(0), |name| camera_index(&$solved, name))?;
+                let target = &target.printing.target;
+                let found = $solved.estimate.pose_uncertainty(camera, target, distance_mm);
+                let sd = |of: solver::PoseSd| (of.rotation_rad, of.across_mm, of.along_mm);
+                Ok(found.map(|found| (sd(found.calibration), sd(found.per_px))))
             }
 
             /// Returns the text of its file.
@@ -336,18 +373,7 @@ impl Rig {
         distance_mm: f64,
     ) -> PyResult<Option<(f64, f64)>> {
         let distance_mm = arrays::distance(Some(distance_mm))?.unwrap_or_default();
-        let cameras = &self.solved.estimate.cameras;
-        let index = |name: &str| {
-            let index = cameras.iter().position(|camera| camera.name == name);
-            index.ok_or_else(|| {
-                let names: Vec<&str> = cameras.iter().map(|camera| camera.name.as_str()).collect();
-                raised::CalibrationError::new_err(format!(
-                    "no camera is named {name} (cameras: {})",
-                    names.join(", ")
-                ))
-            })
-        };
-        let pair = [index(first)?, index(second)?];
+        let pair = [camera_index(&self.solved, first)?, camera_index(&self.solved, second)?];
         let found = self.solved.estimate.depth_uncertainty(pair, distance_mm);
         Ok(found.map(|found| (found.sd_mm, found.mm_per_px)))
     }
@@ -431,6 +457,17 @@ impl Rig {
     fn __eq__(&self, other: &Self) -> bool {
         self.solved.is_same(&other.solved)
     }
+}
+
+/// Returns the index of a camera.
+fn camera_index(solved: &Solved, name: &str) -> PyResult<usize> {
+    let cameras = &solved.estimate.cameras;
+    let index = cameras.iter().position(|camera| camera.name == name);
+    index.ok_or_else(|| {
+        let names: Vec<&str> = cameras.iter().map(|camera| camera.name.as_str()).collect();
+        let names = names.join(", ");
+        raised::CalibrationError::new_err(format!("no camera is named {name} (cameras: {names})"))
+    })
 }
 
 /// Returns the text of a file, with its corners if requested.

@@ -346,9 +346,12 @@ impl Solved {
             return text.clone();
         }
         let Self { estimate, diagnoses, print, .. } = self;
+        let targets: Vec<_> = self.targets.iter().map(|one| one.target.clone()).collect();
+        let poses = estimate.pose_uncertainties(&targets);
         match self.is_rig {
-            true => rig::write(estimate, diagnoses, &self.model, *print, residuals),
-            false => calibration::write(estimate, diagnoses, *print, residuals).unwrap_or_default(),
+            true => rig::write(estimate, diagnoses, &self.model, *print, residuals, &poses),
+            false => calibration::write(estimate, diagnoses, *print, residuals, &poses)
+                .unwrap_or_default(),
         }
     }
 

@@ -127,7 +127,7 @@ fn a_rig_estimates_the_shape_of_a_sheet() {
     let alone = of(&views(bent, 1)).board_shape(true).hold_out(Some(4)).solve().unwrap();
     check_read_back(
         &alone,
-        &calibration::write(&alone, &[], Print::default(), Residuals::Listed).unwrap(),
+        &calibration::write(&alone, &[], Print::default(), Residuals::Listed, &[]).unwrap(),
     );
     let both = of(&views(bent, 1)).camera("right", of_right, Model::Radtan);
     let found = both.clone().board_shape(true).hold_out(Some(5)).solve().unwrap();
@@ -141,7 +141,7 @@ fn a_rig_estimates_the_shape_of_a_sheet() {
     }
     let [turn, step] = found.cameras[1].camera_from_rig.off(&right);
     assert!(turn.length() < 1e-3 && step.length() < 0.5, "{turn} {step}");
-    let text = rig::write(&found, &[], "radtan", Print::default(), Residuals::Listed);
+    let text = rig::write(&found, &[], "radtan", Print::default(), Residuals::Listed, &[]);
     check_read_back(&found, &text);
     // Without the shape, the diagnosis blames the board.
     let flat = both.solve().unwrap();

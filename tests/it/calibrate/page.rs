@@ -189,7 +189,8 @@ fn as_before(text: &str) -> String {
 fn files_without_residuals_and_earlier_files_give_the_same_page() {
     let found = of(&views(&camera(Model::Radtan), 2), Model::Radtan).solve().unwrap();
     let other = of(&views(&camera(Model::Radtan), 3), Model::Radtan).solve().unwrap();
-    let written = |residuals| calibration::write(&found, &[], Print::default(), residuals).unwrap();
+    let written =
+        |residuals| calibration::write(&found, &[], Print::default(), residuals, &[]).unwrap();
     let (brief, listed) = (written(Residuals::Omitted), written(Residuals::Listed));
     assert!(brief.len() < listed.len() / 4, "{} {}", brief.len(), listed.len());
     let read = |text: &str| saved::read_without_target(text).unwrap().cameras.remove(0);

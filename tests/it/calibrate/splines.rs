@@ -164,7 +164,8 @@ fn a_spline_is_written_and_read_back() {
     let camera = &found.cameras[0];
     assert_eq!(Camera::from_yaml(&camera.camera.to_yaml()).unwrap(), camera.camera);
     let residuals = calibration::Residuals::Omitted;
-    let text = calibration::write(&found, &[], calibration::Print::default(), residuals).unwrap();
+    let text =
+        calibration::write(&found, &[], calibration::Print::default(), residuals, &[]).unwrap();
     let read = &saved::read_without_target(&text).unwrap().cameras[0];
     assert_eq!((&read.camera, read.model), (&camera.camera, camera.model));
     let pixel = DVec2::new(500.0, 400.0);

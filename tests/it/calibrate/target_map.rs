@@ -301,7 +301,7 @@ fn a_measured_target_reduces_the_residuals_of_other_views() {
     let map = found.map.as_ref().unwrap();
     let held_out = found.held_out.as_ref().unwrap();
     assert!((held_out.rms_px / NOISE_PX - 1.0).abs() < 0.15, "{}", held_out.rms_px);
-    let text = calibration::write(&found, &[], Print::default(), Residuals::Listed).unwrap();
+    let text = calibration::write(&found, &[], Print::default(), Residuals::Listed, &[]).unwrap();
     let read = saved::read(&text, &Reference::Grid(BOARD)).unwrap();
     assert_eq!(read.map.as_ref(), Some(map));
 

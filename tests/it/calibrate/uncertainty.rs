@@ -249,7 +249,7 @@ fn projection_uncertainties_are_read_back() {
         .distances_mm(vec![250.0, 4000.0])
         .solve()
         .unwrap();
-    let text = calibration::write(&found, &[], Print::default(), Residuals::Omitted).unwrap();
+    let text = calibration::write(&found, &[], Print::default(), Residuals::Omitted, &[]).unwrap();
     let read = saved::read_without_target(&text).unwrap().cameras.remove(0);
     let camera = &found.cameras[0];
     let [one, other] = [camera, &read].map(CameraEstimate::uncertainty_maps);

@@ -310,7 +310,8 @@ fn detections() {
             Ok(found) => {
                 let said = calibration.explain(&found);
                 let text =
-                    calibration::write(&found, &said, Print::default(), Residuals::Listed).unwrap();
+                    calibration::write(&found, &said, Print::default(), Residuals::Listed, &[])
+                        .unwrap();
                 is_finite_json(&text, &what);
                 let camera = &found.cameras[0].camera;
                 is_finite(&camera.to_yaml(), &what);

@@ -69,7 +69,8 @@ impl Solved {
             "sd": found.parameters.iter().map(|parameter| parameter.sd).collect::<Vec<_>>(),
             "projection_sd_px": found.projection_sd_px(None, deltille_calibrate::Source::Noise),
         });
-        let json = calibration::write(&estimate, &diagnoses, print, Residuals::Omitted)
+        let poses = estimate.pose_uncertainties(std::slice::from_ref(&target));
+        let json = calibration::write(&estimate, &diagnoses, print, Residuals::Omitted, &poses)
             .unwrap_or_default();
         let file = CameraFile {
             camera: found.camera.clone(),

@@ -12,7 +12,8 @@ use glam::{DMat3, DVec2, DVec3};
 use nalgebra::{DMatrix, Matrix2, Matrix6, RowDVector, RowVector2, SMatrix, Vector2, Vector6};
 
 use super::request::CornerLabel;
-use super::sensitivity::{CameraOf, Measured, Point, Sensitivity, Variances};
+use super::sensitivity::{Measured, Point, Sensitivity, Variances};
+use crate::estimate::on_rig::CameraOnRig;
 use crate::input::observation::Observation;
 use crate::uncertainty::projection::{by_motion, by_parameters};
 use deltille_core::camera::{Pose, Projection};
@@ -52,7 +53,7 @@ pub(super) type Seen<'a> = (CornerLabel, &'a Observation, &'a Pose, Variances);
 
 impl InPlane {
     /// `None` if the corners do not determine the pose, or the camera cannot image them.
-    pub(super) fn of(camera: &CameraOf, seen: &[Seen], start: Pose) -> Option<Self> {
+    pub(super) fn of(camera: &CameraOnRig, seen: &[Seen], start: Pose) -> Option<Self> {
         let mut pose = start;
         for _ in 0..POSE_STEPS {
             let (normal, right) = normal(camera, seen, &pose)?;
@@ -77,7 +78,7 @@ impl InPlane {
 
 /// The projection of a point on the target at a pose, with the derivatives with respect to the pose.
 fn projected(
-    camera: &CameraOf,
+    camera: &CameraOnRig,
     pose: &Pose,
     on_target: DVec3,
 ) -> Option<(Projection, SMatrix<f64, 2, 6>)> {
@@ -88,7 +89,11 @@ fn projected(
 }
 
 /// N and Σ JᵀW r.
-fn normal(camera: &CameraOf, seen: &[Seen], pose: &Pose) -> Option<(Matrix6<f64>, Vector6<f64>)> {
+fn normal(
+    camera: &CameraOnRig,
+    seen: &[Seen],
+    pose: &Pose,
+) -> Option<(Matrix6<f64>, Vector6<f64>)> {
     let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
     for (_, of, panel, variances) in seen {
         let (at, by_pose) = projected(camera, pose, panel.apply(of.panel_mm))?;
@@ -102,7 +107,7 @@ fn normal(camera: &CameraOf, seen: &[Seen], pose: &Pose) -> Option<(Matrix6<f64>
 
 /// Measures a corner at a pose.
 fn measured(
-    camera: &CameraOf,
+    camera: &CameraOnRig,
     &(label, of, panel, variances): &Seen,
     pose: &Pose,
 ) -> Option<(Point, Corner)> {

@@ -9,8 +9,9 @@ use super::acceptance::{Acceptance, Budget, LengthError, Probing};
 use super::in_plane::{InPlane, Seen};
 use super::lines;
 use super::request::{AcceptanceRequest, CornerLabel};
-use super::sensitivity::{CameraOf, Measured, Point, Variances, variance};
+use super::sensitivity::{Measured, Point, Variances, variance};
 use super::triangulated::{Image, Triangulated};
+use crate::estimate::on_rig::CameraOnRig;
 use crate::estimate::values::Estimate;
 use crate::input::calibration::Calibration;
 use crate::input::observation::{MIN_CORNERS, Observation, View};
@@ -106,7 +107,7 @@ type Frames = BTreeMap<String, Vec<(usize, View)>>;
 /// What all frames have in common.
 struct Test<'a> {
     request: &'a AcceptanceRequest,
-    cameras: Vec<CameraOf<'a>>,
+    cameras: Vec<CameraOnRig<'a>>,
     panels: Vec<Pose>,
     /// The observed covariance of the unknowns, and its degrees of freedom.
     covariance: &'a DMatrix<f64>,
@@ -223,23 +224,14 @@ impl Calibration {
 
     /// `None` without an observed covariance of the estimate.
     fn test<'a>(&self, before: &'a Estimate, request: &'a AcceptanceRequest) -> Option<Test<'a>> {
-        let observed = match before.cameras.as_slice() {
-            [only] => only.projection.as_ref()?.observed.as_ref()?,
-            _ => before.joint.as_ref()?,
-        };
-        let mut cameras: Vec<CameraOf> = Vec::new();
-        let mut column = 0;
-        for estimate in &before.cameras {
-            cameras.push(CameraOf { estimate, free: estimate.free(), column });
-            column += cameras.last()?.unknowns();
-        }
+        let (cameras, observed) = before.cameras_on_rig()?;
         let (covariance, variance) = (observed.covariance.inner(), before.sigma.powi(2));
         // Without a common standard deviation, all corners had equal weights, and sigma is that of a corner.
         let (scale, other_px2) = match before.common_px {
             Some(common_px) => (variance, common_px * common_px * variance),
             None => (0.0, variance),
         };
-        (covariance.nrows() == column).then(|| Test {
+        Some(Test {
             request,
             cameras,
             panels: self.panel_poses(),

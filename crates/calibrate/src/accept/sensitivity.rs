@@ -4,23 +4,6 @@ use glam::DVec3;
 use nalgebra::{DMatrix, RowDVector};
 
 use super::request::CornerLabel;
-use crate::estimate::values::CameraEstimate;
-
-/// A camera and its unknowns.
-pub(super) struct CameraOf<'a> {
-    pub estimate: &'a CameraEstimate,
-    /// The estimated parameters.
-    pub free: Vec<usize>,
-    /// The first of its unknowns among those of all cameras.
-    pub column: usize,
-}
-
-impl CameraOf<'_> {
-    /// Number of its unknowns: parameters, then the pose if that was estimated.
-    pub(super) fn unknowns(&self) -> usize {
-        self.free.len() + if self.estimate.pose_sd.is_some() { 6 } else { 0 }
-    }
-}
 
 /// A corner that a frame measures.
 #[derive(Clone, Copy, Debug)]

@@ -7,12 +7,12 @@
 //! for errors ε of the corners and errors δu of the cameras.
 
 use glam::{DMat3, DVec2, DVec3};
-use nalgebra::{DMatrix, Matrix3, Matrix3xX, SMatrix, Vector2, Vector3};
+use nalgebra::{Matrix3, Matrix3xX, Vector2, Vector3};
 
 use super::request::CornerLabel;
-use super::sensitivity::{CameraOf, Measured, Point, Sensitivity, Variances};
+use super::sensitivity::{Measured, Point, Sensitivity, Variances};
+use crate::estimate::on_rig::{CameraOnRig, Sight};
 use crate::input::panel::PanelRef;
-use crate::uncertainty::projection::{by_motion, by_parameters};
 use deltille_core::camera::Pose;
 
 /// Number of Gauss–Newton steps: the start is off by a thousandth of the distance, and the problem is nearly linear.
@@ -21,7 +21,7 @@ const STEPS: usize = 6;
 /// A corner in the image of a camera.
 #[derive(Clone, Copy)]
 pub(super) struct Image<'a> {
-    pub camera: &'a CameraOf<'a>,
+    pub camera: &'a CameraOnRig<'a>,
     pub pixel: DVec2,
     pub variances: Variances,
 }
@@ -64,7 +64,7 @@ impl Triangulated {
         for _ in 0..STEPS {
             let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
             for image in images {
-                let (off, by_point, _) = image.linear(at)?;
+                let (off, Sight { by_point, .. }) = image.linear(at)?;
                 let pull = by_point.transpose() * image.variances.information()?;
                 normal += pull * by_point;
                 right += pull * off;
@@ -76,7 +76,7 @@ impl Triangulated {
         let (mut noise, mut other) = (Matrix3::zeros(), Matrix3::zeros());
         let mut across = Matrix3xX::zeros(unknowns);
         for image in images {
-            let (off, by_point, by_camera) = image.linear(at)?;
+            let (off, Sight { by_point, by_camera, .. }) = image.linear(at)?;
             squares += off.norm_squared();
             let pull = by_point.transpose() * image.variances.information()?;
             normal += pull * by_point;
@@ -96,25 +96,11 @@ impl Triangulated {
 }
 
 impl Image<'_> {
-    /// The residual at a point in the frame of the rig, and the derivatives with respect to the point and to the unknowns of the
-    /// camera.
-    fn linear(&self, at: DVec3) -> Option<(Vector2<f64>, SMatrix<f64, 2, 3>, DMatrix<f64>)> {
-        let of = self.camera.estimate;
-        let pose = &of.camera_from_rig;
-        let place = pose.apply(at);
-        let seen = of.camera.project_with_derivatives(place)?;
-        let rows = seen.by_point.map(|row| pose.rotation.conjugate() * DVec3::from(row));
-        let by_point = SMatrix::from_fn(|i, j| rows[i][j]);
-        let free = &self.camera.free;
-        let mut by_camera = DMatrix::zeros(2, self.camera.unknowns());
-        by_camera.columns_mut(0, free.len()).copy_from(&by_parameters(&seen, free));
-        if of.pose_sd.is_some() {
-            // The pose rotates points about the camera's place, before they are moved to it.
-            let by_pose = by_motion(&seen, place - pose.translation);
-            by_camera.columns_mut(free.len(), 6).copy_from(&by_pose);
-        }
-        let off = self.pixel - seen.pixel;
-        Some((Vector2::new(off.x, off.y), by_point, by_camera))
+    /// The residual at a point in the frame of the rig, and the derivatives of the pixel.
+    fn linear(&self, at: DVec3) -> Option<(Vector2<f64>, Sight)> {
+        let seen = self.camera.sight(at)?;
+        let off = self.pixel - seen.projection.pixel;
+        Some((Vector2::new(off.x, off.y), seen))
     }
 }
 

@@ -12,8 +12,9 @@
 use glam::{DMat3, DVec2, DVec3};
 use nalgebra::{DMatrix, Matrix3, RowDVector, SMatrix, Vector3};
 
-use super::values::{CameraEstimate, Estimate};
-use crate::uncertainty::projection::{by_motion, by_parameters, seen_at};
+use super::on_rig::CameraOnRig;
+use super::values::Estimate;
+use crate::uncertainty::projection::seen_at;
 use deltille_core::camera::Pose;
 
 /// Number of positions along the longer side of an image.
@@ -40,21 +41,17 @@ impl Estimate {
         cameras: [usize; 2],
         distance_mm: f64,
     ) -> Option<DepthUncertainty> {
-        let covariance = self.joint.as_ref()?.covariance.inner();
-        let [first, second] = [self.cameras.get(cameras[0])?, self.cameras.get(cameras[1])?];
-        let columns = cameras.map(|index| self.cameras[..index].iter().map(unknowns).sum());
-        let all: usize = self.cameras.iter().map(unknowns).sum();
-        if covariance.nrows() != all {
-            return None;
-        }
-        let size = first.size_px();
+        let (all, observed) = self.cameras_on_rig()?;
+        let covariance = observed.covariance.inner();
+        let pair = [all.get(cameras[0])?, all.get(cameras[1])?];
+        let size = pair[0].estimate.size_px();
         let parts = (size * POSITIONS as f64 / size.max_element()).round().max(DVec2::ONE);
         let (mut variance, mut noise, mut count) = (0.0, 0.0, 0.0);
         for row in 0..parts.y as usize {
             for column in 0..parts.x as usize {
                 let pixel = (DVec2::new(column as f64, row as f64) + 0.5) * size / parts - 0.5;
-                let pair = [(first, columns[0]), (second, columns[1])];
-                let Some(change) = Change::of(pair, pixel, distance_mm, all) else { continue };
+                let change = Change::of(pair, pixel, distance_mm, covariance.nrows());
+                let Some(change) = change else { continue };
                 variance += (&change.by_unknowns * covariance * change.by_unknowns.transpose())[0];
                 noise += change.noise_mm2;
                 count += 1.0;
@@ -83,11 +80,6 @@ impl Estimate {
     }
 }
 
-/// Number of estimated unknowns of a camera on a rig.
-fn unknowns(camera: &CameraEstimate) -> usize {
-    camera.free().len() + if camera.pose_sd.is_some() { 6 } else { 0 }
-}
-
 /// How a triangulated distance changes.
 struct Change {
     /// Its derivatives with respect to the unknowns of all cameras.
@@ -97,47 +89,35 @@ struct Change {
 }
 
 impl Change {
-    /// For the point at a distance that the first camera sees at a pixel; `None` if the second one does not see it. Each
-    /// camera has the index of its first unknown.
+    /// For the point at a distance that the first camera sees at a pixel; `None` if the second one does not see it.
     fn of(
-        pair: [(&CameraEstimate, usize); 2],
+        [first, second]: [&CameraOnRig; 2],
         pixel: DVec2,
         distance_mm: f64,
-        all: usize,
+        unknowns: usize,
     ) -> Option<Self> {
-        let (first, column) = pair[0];
-        let rig_from_first = first.camera_from_rig.inverse();
-        let point = rig_from_first.apply(seen_at(&first.camera, pixel, Some(distance_mm))?);
+        let rig_from_first = first.estimate.camera_from_rig.inverse();
+        let place = seen_at(&first.estimate.camera, pixel, Some(distance_mm))?;
+        let point = rig_from_first.apply(place);
         let sight = (point - rig_from_first.translation).normalize_or_zero();
         let sight = Vector3::from(sight.to_array());
         let mut normal = Matrix3::zeros();
-        let mut across = DMatrix::zeros(3, all);
-        for (camera, column) in pair {
-            let pose = &camera.camera_from_rig;
-            let place = pose.apply(point);
-            let at = camera.camera.project_with_derivatives(place)?;
-            if !camera.camera.sees(at.pixel, 0.0) {
+        let mut across = DMatrix::zeros(3, unknowns);
+        for camera in [first, second] {
+            let seen = camera.sight(point)?;
+            if !camera.estimate.camera.sees(seen.projection.pixel, 0.0) {
                 return None;
             }
-            let [x, y] = at.by_point.map(DVec3::from).map(|row| pose.rotation.conjugate() * row);
-            let by_point = SMatrix::<f64, 2, 3>::from_row_slice(&[x.x, x.y, x.z, y.x, y.y, y.z]);
-            normal += by_point.transpose() * by_point;
-            let free = camera.free();
-            let mut columns = across.columns_mut(column, unknowns(camera));
-            let lens = by_point.transpose() * by_parameters(&at, &free);
-            columns.columns_mut(0, free.len()).copy_from(&lens);
-            if camera.pose_sd.is_some() {
-                // The pose rotates points about the camera's place, before they are moved to it.
-                let by_pose = by_motion(&at, place - pose.translation);
-                columns.columns_mut(free.len(), 6).copy_from(&(by_point.transpose() * by_pose));
-            }
+            normal += seen.by_point.transpose() * seen.by_point;
+            let mut columns = across.columns_mut(camera.column, camera.unknowns());
+            columns.copy_from(&(seen.by_point.transpose() * &seen.by_camera));
         }
         let inverse = normal.try_inverse()?;
         let pull = inverse * sight;
         let mut by_unknowns = -(pull.transpose() * across);
-        if first.pose_sd.is_some() {
-            let of_place = sight.transpose() * by_place(&first.camera_from_rig);
-            let mut columns = by_unknowns.columns_mut(column + first.free().len(), 6);
+        if first.estimate.pose_sd.is_some() {
+            let of_place = sight.transpose() * by_place(&first.estimate.camera_from_rig);
+            let mut columns = by_unknowns.columns_mut(first.column + first.free.len(), 6);
             columns -= of_place;
         }
         Some(Self { by_unknowns, noise_mm2: sight.dot(&pull) })
@@ -157,6 +137,7 @@ fn by_place(camera_from_rig: &Pose) -> SMatrix<f64, 3, 6> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimate::values::CameraEstimate;
     use crate::matrix::Matrix;
     use crate::uncertainty::projection::ObservedCovariance;
     use deltille_core::camera::{BrownConrady, Camera, Lens};
@@ -177,7 +158,19 @@ mod tests {
             of.pose_sd = (index > 0).then_some([1.0; 6]);
             of
         };
-        Estimate { cameras: (0..3).map(camera).collect(), ..Estimate::default() }
+        let cameras: Vec<CameraEstimate> = (0..3).map(camera).collect();
+        let mut rig = Estimate { cameras, ..Estimate::default() };
+        set_covariance(&mut rig, |_, _| 0.0);
+        rig
+    }
+
+    /// Sets the observed covariance of the unknowns of a rig.
+    fn set_covariance(rig: &mut Estimate, of: impl Fn(usize, usize) -> f64) {
+        let unknowns =
+            |of: &CameraEstimate| of.free().len() + 6 * usize::from(of.pose_sd.is_some());
+        let all = rig.cameras.iter().map(unknowns).sum();
+        let covariance = Matrix::from_fn(all, all, of);
+        rig.joint = Some(ObservedCovariance { covariance, of_board: None, freedom: 10.0 });
     }
 
     /// The distance from the first of two cameras of the point that projects to two pixels with the least squares.
@@ -206,12 +199,10 @@ mod tests {
     fn derivatives_equal_finite_differences() {
         for [first, second] in [[0, 1], [1, 2]] {
             let rig = rig();
-            let all: usize = rig.cameras.iter().map(unknowns).sum();
-            let columns =
-                [first, second].map(|index| rig.cameras[..index].iter().map(unknowns).sum());
-            let pair = [(&rig.cameras[first], columns[0]), (&rig.cameras[second], columns[1])];
+            let (all, observed) = rig.cameras_on_rig().unwrap();
             let pixel = DVec2::new(700.0, 300.0);
-            let found = Change::of(pair, pixel, 900.0, all).unwrap();
+            let pair = [&all[first], &all[second]];
+            let found = Change::of(pair, pixel, 900.0, observed.covariance.rows()).unwrap();
             let point = rig.cameras[first].camera_from_rig.inverse();
             let point =
                 point.apply(seen_at(&rig.cameras[first].camera, pixel, Some(900.0)).unwrap());
@@ -220,8 +211,8 @@ mod tests {
                 of.camera.project(of.camera_from_rig.apply(point)).unwrap()
             });
             for index in [first, second] {
-                let start: usize = rig.cameras[..index].iter().map(unknowns).sum();
-                for unknown in 0..unknowns(&rig.cameras[index]) {
+                let start = all[index].column;
+                for unknown in 0..all[index].unknowns() {
                     let distance = |by: f64| {
                         let mut changed = rig.clone();
                         let camera = &mut changed.cameras[index];
@@ -269,10 +260,11 @@ mod tests {
             camera.camera_from_rig.rotation = DQuat::IDENTITY;
         }
         rig.cameras[1].camera_from_rig.translation = DVec3::new(-100.0, 0.0, 0.0);
-        let columns = unknowns(&rig.cameras[0]);
-        let all = columns + unknowns(&rig.cameras[1]);
-        let pair = [(&rig.cameras[0], 0), (&rig.cameras[1], columns)];
-        let found = Change::of(pair, pinhole.centre_px, 2000.0, all).unwrap();
+        set_covariance(&mut rig, |_, _| 0.0);
+        let (all, observed) = rig.cameras_on_rig().unwrap();
+        let (columns, unknowns) = (all[1].column, observed.covariance.rows());
+        let pair = [&all[0], &all[1]];
+        let found = Change::of(pair, pinhole.centre_px, 2000.0, unknowns).unwrap();
         let expected = 2f64.sqrt() * 2000.0 * 2000.0 / (1000.0 * 100.0);
         assert!(
             (found.noise_mm2.sqrt() / expected - 1.0).abs() < 0.01,
@@ -282,8 +274,7 @@ mod tests {
         // A base that is 1 % longer makes distances 1 % longer.
         let by_base = found.by_unknowns[columns + 4 + 3];
         assert!((by_base + 2000.0 / 100.0).abs() < 0.2, "{by_base}");
-        let covariance = Matrix::from_fn(all, all, |i, j| f64::from(i == j && i == columns + 7));
-        rig.joint = Some(ObservedCovariance { covariance, of_board: None, freedom: 10.0 });
+        set_covariance(&mut rig, |i, j| f64::from(i == j && i == columns + 7));
         let found = rig.depth_uncertainty([0, 1], 2000.0).unwrap();
         assert!((found.sd_mm / 20.0 - 1.0).abs() < 0.1, "{found:?}");
     }

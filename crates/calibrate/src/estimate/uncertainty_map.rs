@@ -1,10 +1,11 @@
 //! The projection uncertainty of an estimated camera over its image.
 
-use glam::DVec2;
+use glam::{DMat2, DVec2};
 
 use super::values::CameraEstimate;
 use crate::matrix::Matrix;
 use crate::uncertainty::projection::{Source, by_motion, by_parameters, seen_at};
+use deltille_core::camera::Undistortion;
 
 /// A map of the projection uncertainty of a camera over its image.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,6 +89,54 @@ impl CameraEstimate {
         let distances = std::iter::once(None).chain(distances.map(|&mm| Some(mm)));
         let both = distances.flat_map(|mm| [(mm, Source::Noise), (mm, Source::Observed)]);
         both.filter_map(|(mm, source)| self.uncertainty_map(mm, source)).collect()
+    }
+
+    /// Covariance of a position in an undistorted view, px², that is due to the estimated camera, for points at infinity; `None` where
+    /// the camera sees nothing, or if it is not known.
+    ///
+    /// The view shows at v the pixel p(v) of the image. A projection that is off by δp is off by −(∂p/∂v)⁻¹ δp in the view.
+    pub fn undistorted_covariance(
+        &self,
+        view: &Undistortion,
+        pixel: DVec2,
+        source: Source,
+    ) -> Option<[[f64; 2]; 2]> {
+        let at = view.source(pixel)?;
+        let [[xx, xy], [_, yy]] = self.projection_covariance(at, None, source)?;
+        let along = |axis: DVec2| {
+            let [more, less] = [1.0, -1.0].map(|side| view.source(pixel + side * axis));
+            Some(match (more, less) {
+                (Some(more), Some(less)) => (more - less) / 2.0,
+                (Some(more), None) => more - at,
+                (None, less) => at - less?,
+            })
+        };
+        let by_view = DMat2::from_cols(along(DVec2::X)?, along(DVec2::Y)?);
+        let by_source = by_view.inverse();
+        let covariance = DMat2::from_cols(DVec2::new(xx, xy), DVec2::new(xy, yy));
+        let found = by_source * covariance * by_source.transpose();
+        found.is_finite().then(|| found.to_cols_array_2d())
+    }
+
+    /// Standard deviation of positions in an undistorted view, px: RMS per axis over the view, and the largest one along any
+    /// direction. `None` if it is not known.
+    pub fn undistorted_sd_px(&self, view: &Undistortion, source: Source) -> Option<[f64; 2]> {
+        let [width, height] = [view.view().width, view.view().height].map(f64::from);
+        let size = DVec2::new(width, height);
+        let steps = (size * POSITIONS as f64 / size.max_element()).round().max(DVec2::ONE);
+        let (mut sum, mut count, mut largest) = (0.0, 0.0, 0.0);
+        for row in 0..=steps.y as usize {
+            for column in 0..=steps.x as usize {
+                let pixel = DVec2::new(column as f64, row as f64) * (size - 1.0) / steps;
+                let Some(found) = self.undistorted_covariance(view, pixel, source) else {
+                    continue;
+                };
+                sum += f64::midpoint(found[0][0], found[1][1]);
+                count += 1.0;
+                largest = f64::max(largest, worst(found));
+            }
+        }
+        (count > 0.0).then(|| [(sum / count).sqrt(), largest.sqrt()])
     }
 
     /// Standard deviation of a projection per axis, px: the RMS over the detected corners. `None` if it is not known.

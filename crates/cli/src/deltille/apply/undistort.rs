@@ -19,13 +19,12 @@ use crate::output::{self, Overwrite, say};
 use crate::run::{self, BAD_INPUT, FAILED, Interrupted};
 use crate::values::distance;
 use crate::{interrupt, progress};
-use deltille::calibrate::Estimate;
+use deltille::calibrate::{CameraEstimate, Estimate, Source};
 use deltille::camera::{Camera, CameraFile, Field, PixelMap, Rectification, Undistortion};
 use deltille::export::camera::{opencv, ros};
 use deltille::export::kind::{Kind, signed_png};
-use deltille::export::{atomic, saved, undistortion};
+use deltille::export::{atomic, undistortion};
 use deltille::frames::{Frame, FrameOptions, is_recording};
-use deltille::limits::Limits;
 use deltille::remap::remapped;
 use deltille_core::words::counted;
 
@@ -63,7 +62,8 @@ pub struct Args {
     images: Vec<PathBuf>,
     #[command(flatten)]
     recording: RecordingArgs,
-    /// Camera file of `deltille calibrate`, ROS or OpenCV
+    /// Camera file of `deltille calibrate`, ROS or OpenCV; with the .json of `deltille calibrate`, the uncertainty of positions in
+    /// the undistorted images is reported
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
     #[command(flatten)]
@@ -162,8 +162,15 @@ impl ViewArgs {
 
 /// Creates a pinhole view of a camera, and undistorts its images.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let file = camera_file::read_with_targets("--camera", &args.camera)?;
-    let CameraFile { camera, calibrated_with, failed } = file;
+    let (found, failed) = camera_file::read_calibration("--camera", &args.camera)?;
+    let [known] = found.cameras.as_slice() else {
+        bail!(
+            "--camera: {}: this file contains {}; use `deltille rectify`, or the .yaml of one of them",
+            args.camera.display(),
+            counted(found.cameras.len(), "camera")
+        );
+    };
+    let (camera, calibrated_with) = (known.camera.clone(), found.calibrated_with.clone());
     let stem = args.camera.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let stem = format!("{stem}-undistorted");
     let made = Undistortion::new(&camera, args.view.size_of(&camera)?, args.view.field);
@@ -176,11 +183,28 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let map = args.view.map(&made);
     let view = CameraFile { camera: made.view().clone(), calibrated_with, failed };
     let mut files = args.view.files(&stem, &view, &map)?;
-    files.insert(0, text_file(format!("{stem}.json"), undistortion::write(&made, &map)));
+    let sd = position_sd(known, &made);
+    files.insert(0, text_file(format!("{stem}.json"), undistortion::write(&made, &map, sd)));
     let staged = Staged::new(&args.view.output, &files, args.view.overwrite)?;
     say!("{}", describe(made.view(), &map));
+    if let Some(sd) = sd {
+        say!("{}", describe_sd(sd));
+    }
     let made = pictures.write(&images, &map)?;
     made.end(staged)
+}
+
+/// Returns the standard deviations of positions in a view that are due to the calibration of its camera.
+fn position_sd(camera: &CameraEstimate, view: &Undistortion) -> Option<[f64; 2]> {
+    let from = |source| camera.undistorted_sd_px(view, source);
+    from(Source::Observed).or_else(|| from(Source::Noise))
+}
+
+/// Describes these standard deviations.
+fn describe_sd([rms, largest]: [f64; 2]) -> String {
+    format!(
+        "positions in it are known to {rms:.4} px (1σ, RMS per axis), and to {largest:.4} px at worst"
+    )
 }
 
 /// Describes a view in one line.
@@ -368,16 +392,20 @@ pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
     let sample = [text_file(format!("{stem}.json"), sample_of(undistortion::PAIR_SCHEMA))];
     check_places(&args.view.output, &sample, args.view.overwrite)?;
     let maps = [&made.views[0], &made.views[1]].map(|view| args.view.map(view));
+    let sd = [position_sd(first, &made.views[0]), position_sd(second, &made.views[1])];
     let mut files = vec![
-        text_file(format!("{stem}.json"), undistortion::write_pair(&made, names, &maps)),
+        text_file(format!("{stem}.json"), undistortion::write_pair(&made, names, &maps, sd)),
         text_file(format!("{stem}-opencv.yaml"), undistortion::opencv_pair(&made)),
     ];
-    let views = made.views.iter().zip(calibrated_with);
-    for ((name, (view, calibrated_with)), map) in names.iter().zip(views).zip(&maps) {
+    let views = made.views.iter().zip(calibrated_with).zip(sd);
+    for ((name, ((view, calibrated_with), sd)), map) in names.iter().zip(views).zip(&maps) {
         let file =
             CameraFile { camera: view.view().clone(), calibrated_with, failed: failed.clone() };
         files.extend(args.view.files(&format!("{name}-rectified"), &file, map)?);
         say!("{name}: {}", describe(view.view(), map));
+        if let Some(sd) = sd {
+            say!("{name}: {}", describe_sd(sd));
+        }
     }
     let baseline = made.baseline_mm;
     let (mm, what) = match baseline.y == 0.0 {
@@ -396,13 +424,12 @@ pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
 
 /// Reads the rig in a file, and the reason why its calibration failed, if any.
 fn read_rig(path: &Path) -> anyhow::Result<(Estimate, Option<String>)> {
-    let text = Limits::default().read_text(path)?;
-    let found = saved::read_without_target(&text).with_context(|| path.display().to_string())?;
+    let (found, failed) = camera_file::read_calibration("RIG", path)?;
     if found.cameras.len() < 2 {
         bail!(
-            "{}: this file contains a single camera; use the rig.json of `deltille rig`",
+            "RIG: {}: this file contains a single camera; use the rig.json of `deltille rig`",
             path.display()
         );
     }
-    Ok((found, camera_file::warn_if_failed(path, &text)))
+    Ok((found, failed))
 }

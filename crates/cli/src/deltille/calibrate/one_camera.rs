@@ -10,7 +10,7 @@ use super::compensation::{self, prepare};
 use super::report_page::check_images;
 use super::sightings::{Sightings, SightingsArgs};
 use super::solving::{
-    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out,
+    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out, pose_uncertainty,
     projection_uncertainty, richest, sample, with_constraints, without_outliers,
 };
 use crate::deltille::files::camera_file;
@@ -21,7 +21,7 @@ use crate::interrupt;
 use crate::output::{self, Overwrite, log};
 use crate::run::{FAILED, report};
 use crate::values::format;
-use deltille::calibrate::{CameraEstimate, Estimate, Intrinsics, Model, Source};
+use deltille::calibrate::{CameraEstimate, Estimate, Intrinsics, Model, PoseUncertainty, Source};
 use deltille::camera::{Camera, CameraFile, Lens, PROJECTION_PARAMETERS, Pose, SplineGrid};
 use deltille::export::camera::FormatError;
 use deltille::export::named::Format;
@@ -132,9 +132,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let Calibrated { estimate, diagnoses, print, .. } = &solved;
     let (mut files, mut refused) = (Vec::new(), Vec::new());
+    let poses = estimate.pose_uncertainties(&targets);
     for camera in &estimate.cameras {
         let views = camera.views.iter().map(|view| (view.image.as_str(), view.pose));
-        let json = calibration::write(estimate, diagnoses, *print, args.solve.residuals());
+        let residuals = args.solve.residuals();
+        let json = calibration::write(estimate, diagnoses, *print, residuals, &poses);
         let json = json.unwrap_or_default();
         let views = views.collect::<Vec<_>>();
         let of_camera = match camera.model {
@@ -155,7 +157,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         solved.has_failed(),
         args.overwrite,
     )?);
-    let mut text = listed + &table(&solved.estimate);
+    let mut text = listed + &table(&solved.estimate, &poses);
     for line in solved.lines() {
         text += &(line + "\n");
     }
@@ -235,11 +237,13 @@ impl Args {
 }
 
 /// Formats the parameters with their standard deviations, and the views with their errors.
-fn table(estimate: &Estimate) -> String {
-    estimate.cameras.iter().map(of_camera).collect::<String>() + &headline(estimate) + "\n"
+fn table(estimate: &Estimate, poses: &[PoseUncertainty]) -> String {
+    let cameras = estimate.cameras.iter();
+    let poses: String = pose_uncertainty(estimate, poses).map(|line| line + "\n").collect();
+    cameras.map(|camera| of_camera(camera, &poses)).collect::<String>() + &headline(estimate) + "\n"
 }
 
-fn of_camera(camera: &CameraEstimate) -> String {
+fn of_camera(camera: &CameraEstimate, poses: &str) -> String {
     let mut text = String::new();
     let is_observed = camera.covariance_from(Source::Observed).is_some();
     let spline = match &camera.camera.lens {
@@ -279,6 +283,7 @@ fn of_camera(camera: &CameraEstimate) -> String {
     if let Some(line) = projection_uncertainty(camera) {
         let _ = writeln!(text, "{line}");
     }
+    text += poses;
     // Correlations of neighbouring knots are not of interest.
     let found: Vec<&str> = camera.estimated_parameters().filter(|_| spline.is_none()).collect();
     for i in 0..found.len() {

@@ -13,7 +13,7 @@ use super::report_page::check_images;
 use super::rig_cameras::{CamerasArgs, Source, check_named, follow, named};
 use super::sightings::{self, GridArgs, SheetArgs, check_every};
 use super::solving::{
-    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out,
+    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out, pose_uncertainty,
     projection_uncertainty, richest, sample, with_constraints, within, without_outliers,
 };
 use crate::deltille::files::limits::ImageLimits;
@@ -26,8 +26,8 @@ use crate::output::{Overwrite, check_folder, fixed, log, say};
 use crate::run::{FAILED, report};
 use crate::values::format;
 use deltille::calibrate::{
-    Calibration, CameraEstimate, CameraViews, Estimate, Excluded, Intrinsics, Model, Reference,
-    TargetMap,
+    Calibration, CameraEstimate, CameraViews, Estimate, Excluded, Intrinsics, Model,
+    PoseUncertainty, Reference, TargetMap,
 };
 use deltille::camera::{Camera, CameraFile, Pose};
 use deltille::detect::{Detection, InkEstimate};
@@ -174,11 +174,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         report(&foreign.context("--known"));
         return Ok(ExitCode::from(FAILED));
     }
-    text += &summary(&solved);
+    let poses = solved.estimate.pose_uncertainties(&targets);
+    text += &summary(&solved, &poses);
     solved.estimate.excluded.splice(0..0, left_out);
     let Calibrated { estimate, diagnoses, print, .. } = &solved;
     let residuals = args.solve.residuals();
-    let json = rig::write(estimate, diagnoses, &args.model.name(), *print, residuals);
+    let json = rig::write(estimate, diagnoses, &args.model.name(), *print, residuals, &poses);
     let cameras = estimate.cameras.iter();
     let cameras = cameras.map(|c| (c.name.as_str(), &c.camera, c.camera_from_rig));
     let cameras = cameras.collect::<Vec<_>>();
@@ -388,7 +389,7 @@ fn of_name<'a>(given: &'a [(String, PathBuf)], name: &str) -> Option<&'a Path> {
     given.iter().find(|(of, _)| of == name).map(|(_, path)| path.as_path())
 }
 
-fn summary(solved: &Calibrated) -> String {
+fn summary(solved: &Calibrated, poses: &[PoseUncertainty]) -> String {
     let estimate = &solved.estimate;
     let headline = |estimate: &Estimate| {
         format!(
@@ -424,6 +425,7 @@ fn summary(solved: &Calibrated) -> String {
             depth.distance_mm, depth.sd_mm, depth.mm_per_px
         ));
     }
+    lines.extend(pose_uncertainty(estimate, poses));
     lines.extend(solved.lines());
     lines.extend(estimate.held_out.iter().map(|test| format!("held out: {}", headline(test))));
     lines.join("\n")

@@ -16,8 +16,8 @@ use crate::run::FAILED;
 use crate::values::{distance, whole};
 use deltille::calibrate::{
     BoardShape, Calibration, CalibrationError, CameraEstimate, Candidate, Diagnosis, Estimate,
-    Intrinsics, Loss, MIN_VIEWS_TO_MEASURE, Messages, Model, ModelError, PanelPrior, Source,
-    TargetMap, Weights,
+    Intrinsics, Loss, MIN_VIEWS_TO_MEASURE, Messages, Model, ModelError, PanelPrior,
+    PoseUncertainty, Source, TargetMap, Weights,
 };
 use deltille::camera::Camera;
 use deltille::export::calibration::{Print, Residuals};
@@ -389,6 +389,28 @@ pub fn projection_uncertainty(camera: &CameraEstimate) -> Option<String> {
     };
     (!listed.is_empty())
         .then(|| format!("projection uncertainty (1σ): {}{board}", listed.join("; ")))
+}
+
+/// Describes the uncertainty of poses of a target, one line each.
+pub fn pose_uncertainty(
+    found: &Estimate,
+    poses: &[PoseUncertainty],
+) -> impl Iterator<Item = String> {
+    poses.iter().map(|of| {
+        let camera = found.camera_name(of.camera).map_or(String::new(), |name| format!("{name}: "));
+        let [calibration, noise] = [of.calibration, of.per_px].map(|sd| {
+            format!(
+                "{:.4}°, {:.4} mm across and {:.4} mm along the line of sight",
+                sd.rotation_rad.to_degrees(),
+                sd.across_mm,
+                sd.along_mm
+            )
+        });
+        format!(
+            "{camera}pose uncertainty (1σ) of {} at {:.0} mm: {calibration} from the calibration; {noise} for each px of noise",
+            of.target, of.distance_mm
+        )
+    })
 }
 
 /// Adds the constraints on a camera to its file, as a comment.

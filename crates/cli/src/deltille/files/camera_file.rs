@@ -76,20 +76,26 @@ fn warn_of(path: &Path, failure: Option<&str>) {
 
 /// Reads a calibration, the .json of `calibrate` or `rig`, or a camera file; without uncertainties if it failed.
 pub fn read_estimate(option: &str, path: &Path) -> anyhow::Result<Estimate> {
+    read_calibration(option, path).map(|(estimate, _)| estimate)
+}
+
+/// Like [`read_estimate`], with the reason why the calibration failed, if it did.
+pub fn read_calibration(option: &str, path: &Path) -> anyhow::Result<(Estimate, Option<String>)> {
     if !path.extension().is_some_and(|end| end.eq_ignore_ascii_case("json")) {
         let file = read_with_targets(option, path)?;
         let mut estimate = Estimate::default();
         estimate.cameras = vec![CameraEstimate::given("", file.camera)];
         estimate.calibrated_with = file.calibrated_with;
-        return Ok(estimate);
+        return Ok((estimate, file.failed));
     }
     let text = Limits::default().read_text(path).context(option.to_owned())?;
     let mut estimate = saved::read_without_target(&text)
         .with_context(|| format!("{option}: {}", path.display()))?;
-    if warn_if_failed(path, &text).is_some() {
+    let failed = warn_if_failed(path, &text);
+    if failed.is_some() {
         estimate.cameras.iter_mut().for_each(CameraEstimate::forget_uncertainties);
     }
-    Ok(estimate)
+    Ok((estimate, failed))
 }
 
 /// Reads a camera to be fixed in another calibration; fails if its own calibration failed.

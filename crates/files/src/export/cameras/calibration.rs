@@ -11,8 +11,9 @@ use super::estimate::{
 };
 pub use super::estimate::{Print, Residuals, is_failure};
 use super::finding::{FindingRecord, records};
+use super::pose_uncertainty::{PoseUncertaintyRecord, pose_uncertainties};
 use super::rig::{TargetRecord, targets};
-use deltille_calibrate::{Diagnosis, Estimate, Excluded};
+use deltille_calibrate::{Diagnosis, Estimate, Excluded, PoseUncertainty};
 use deltille_core::camera::SplineGrid;
 use deltille_core::detection::InkEstimate;
 use deltille_core::json;
@@ -37,6 +38,8 @@ struct CalibrationFile<'a> {
     ill_conditioned: &'a [String],
     #[serde(skip_serializing_if = "Option::is_none")]
     projection: Option<ProjectionRecord>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pose_uncertainty: Vec<PoseUncertaintyRecord<'a>>,
     rms_px: f64,
     inlier_rms_px: f64,
     corners: usize,
@@ -73,12 +76,14 @@ struct HeldOut<'a> {
     excluded: &'a [Excluded],
 }
 
-/// The JSON text of the calibration of a single camera with its diagnoses; `None` for an estimate without cameras.
+/// The JSON text of the calibration of a single camera with its diagnoses and the uncertainties of poses of its targets; `None` for
+/// an estimate without cameras.
 pub fn write(
     found: &Estimate,
     said: &[Diagnosis],
     print: Print,
     residuals: Residuals,
+    poses: &[PoseUncertainty],
 ) -> Option<String> {
     let camera = found.cameras.first()?;
     let held_out = found.held_out.as_deref();
@@ -94,6 +99,7 @@ pub fn write(
         correlations: correlations(camera),
         ill_conditioned: &camera.ill_conditioned,
         projection: projection(camera),
+        pose_uncertainty: pose_uncertainties(found, poses),
         rms_px: found.rms_px,
         inlier_rms_px: found.inlier_rms_px(),
         corners: found.corner_count(),

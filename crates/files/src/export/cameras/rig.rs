@@ -11,7 +11,8 @@ use super::estimate::{
 };
 use super::finding::{FindingRecord, records};
 use super::motion::Motion;
-use deltille_calibrate::{CameraEstimate, Diagnosis, Estimate, Excluded};
+use super::pose_uncertainty::{PoseUncertaintyRecord, pose_uncertainties};
+use deltille_calibrate::{CameraEstimate, Diagnosis, Estimate, Excluded, PoseUncertainty};
 use deltille_core::camera::SplineGrid;
 use deltille_core::json;
 use deltille_core::targets::TargetIdentity;
@@ -43,6 +44,8 @@ struct RigFile<'a> {
     joint: Option<JointRecord>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     depth: Vec<Depth<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pose_uncertainty: Vec<PoseUncertaintyRecord<'a>>,
     frames: Vec<Frame<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     held_out: Option<HeldOut<'a>>,
@@ -127,13 +130,14 @@ struct Seen<'a> {
 }
 
 /// The JSON text of the calibration of a rig; `model` is the lens model of cameras that do not
-/// specify a model.
+/// specify a model, and `poses` the uncertainties of poses of the targets.
 pub fn write(
     found: &Estimate,
     said: &[Diagnosis],
     model: &str,
     print: Print,
     residuals: Residuals,
+    poses: &[PoseUncertainty],
 ) -> String {
     let held_out = found.held_out.as_deref().map(|test| HeldOut {
         rms_px: test.rms_px,
@@ -157,6 +161,7 @@ pub fn write(
         cameras: found.cameras.iter().map(|camera| of_camera(found, camera, residuals)).collect(),
         joint: found.joint.as_ref().map(joint),
         depth: depth(found),
+        pose_uncertainty: pose_uncertainties(found, poses),
         frames: frames(found),
         held_out,
         excluded: &found.excluded,
