@@ -209,6 +209,9 @@ def test_rigs(board, camera, tmp_path):
     assert sd_mm > 0 and 3.5 < found.depth_sd("left", "right", 1200)[1] / mm_per_px < 4.5
     with pytest.raises(deltille.CalibrationError, match="no camera is named up"):
         found.depth_sd("left", "up", 600)
+    calibration, per_px = found.target_pose_sd(board, 600, camera="right")
+    assert len(calibration) == 3 and 0 < per_px[1] < per_px[2]
+    assert found.target_pose_sd(board, 60) is None
     path = found.save(tmp_path / "rig.json", residuals=True)
     again = deltille.Rig.load(path, target=board)
     assert again.cameras["left"].camera == found.cameras["left"].camera

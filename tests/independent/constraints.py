@@ -103,10 +103,21 @@ def covariances(arguments, options, ours):
     n = len(arrays["names"])
     same = list(arrays["names"]) == texts["names"] and list(arrays["units"]) == texts["units"]
     for name in ("noise", "observed"):
-        listed = np.array([float(row[name]) for row in rows]).reshape(n, n)
-        same &= np.array_equal(arrays[name], texts[name]) and np.array_equal(arrays[name], listed)
-    sds = dict(zip((name.split(".")[1] for name in texts["names"]), np.sqrt(np.diag(arrays["noise"]))))
+        listed = np.array([float(row[name] or "nan") for row in rows]).reshape(n, n)
+        written = np.array(texts[name], float)
+        same &= np.array_equal(arrays[name], written, equal_nan=True) and np.array_equal(written, listed, equal_nan=True)
+    sds = {name.split(".", 1)[1]: sd for name, sd in zip(texts["names"], np.sqrt(np.diag(arrays["noise"])))}
     same &= all(sd is None or abs(sds[name] / sd - 1) < 1e-9 for name, (_, sd) in ours.items() if name in sds)
+    # Poses of views, about the axes of the camera, have the standard deviations that the result states.
+    camera = json.loads((arguments[3] / "camera.json").read_text())
+    for view in camera["views"]:
+        pose = view["camera_from_target"]
+        stated = np.array(pose["rotation_sd_rad"] + pose["translation_sd_mm"])
+        listed = [sds[f"{view['name']}.{axis}"] for axis in ("rx", "ry", "rz", "tx", "ty", "tz")]
+        same &= np.allclose(listed, stated, rtol=1e-6)
+    # A joint covariance of all unknowns is positive definite.
+    scale = np.sqrt(np.diag(arrays["noise"]))
+    same &= np.linalg.eigvalsh(arrays["noise"] / np.outer(scale, scale))[0] > -1e-9
     print(f"covariance of {n} unknowns in three formats: {'equal' if same else 'different'}")
     return same
 

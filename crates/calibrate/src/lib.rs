@@ -86,9 +86,9 @@ pub use error::{CalibrationError, ConstraintError, DegenerateMotion};
 pub use estimate::coverage::Coverage;
 pub use estimate::depth::DepthUncertainty;
 pub use estimate::image_circle::ImageCircle;
+pub use estimate::joint_covariance::{JointCovariance, JointUnknown};
 pub use estimate::lens_limit::LensLimit;
 pub use estimate::pose_uncertainty::{PoseSd, PoseUncertainty};
-pub use estimate::shared::{SharedCovariance, SharedUnknown};
 pub use estimate::target_map::{CornerOffset, MIN_VIEWS_TO_MEASURE, TargetMap};
 pub use estimate::uncertainty_map::UncertaintyMap;
 pub use estimate::values::{

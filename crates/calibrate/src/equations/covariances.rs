@@ -96,6 +96,28 @@ impl Normal {
         Some(Covariances { shared, kept, root, frames, corners, loose, tied })
     }
 
+    /// The covariance of all unknowns for residuals of variance 1: the kept ones, then those of the parts. `None` if a part is
+    /// undetermined.
+    pub(crate) fn covariance_of_all(&self, found: &Covariances) -> Option<DMatrix<f64>> {
+        let inverses = self.inverses(Damping::NONE)?;
+        let [_, through] = self.through(&inverses, 0..inverses.len());
+        let (kept, parts) = (found.kept.nrows(), through.ncols());
+        let carried = &found.kept * &through;
+        let mut all = DMatrix::zeros(kept + parts, kept + parts);
+        all.view_mut((0, 0), (kept, kept)).copy_from(&found.kept);
+        all.view_mut((0, kept), (kept, parts)).copy_from(&-&carried);
+        all.view_mut((kept, 0), (parts, kept)).tr_copy_from(&-&carried);
+        all.view_mut((kept, kept), (parts, parts)).copy_from(&through.tr_mul(&carried));
+        let mut first = kept;
+        for inverse in &inverses {
+            let size = inverse.nrows();
+            let mut own = all.view_mut((first, first), (size, size));
+            own += inverse;
+            first += size;
+        }
+        Some(all)
+    }
+
     /// The covariance of the kept unknowns for residuals of variance 1; `None` if any is undetermined.
     pub(crate) fn covariance_of_kept(&self) -> Option<DMatrix<f64>> {
         let matrix = self.reduced(Damping::NONE)?.matrix;

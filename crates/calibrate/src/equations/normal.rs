@@ -556,6 +556,19 @@ mod tests {
             }
             let covariances = normal.covariances(&layout).unwrap();
             assert!(covariances.loose.is_empty());
+            let all = normal.covariance_of_all(&covariances).unwrap();
+            // The columns are in the order shared, frames, corners, or shared, corners, frames.
+            let of_frames = 6 * problem.frames.len();
+            let own = |i: usize| match (i.checked_sub(layout.shared), layout.corners) {
+                (Some(i), Some(first)) if i < of_frames => first + of_corners + i,
+                (Some(i), Some(first)) => first + i - of_frames,
+                _ => i,
+            };
+            for (i, j) in (0..count).flat_map(|i| (0..count).map(move |j| (i, j))) {
+                let limit = (inverse[(i, i)] * inverse[(j, j)]).sqrt();
+                let off = all[(own(i), own(j))] * scale[i] * scale[j] - inverse[(i, j)];
+                assert!(off.abs() < 1e-4 * limit, "{i}, {j}: {off} of {limit}");
+            }
             for i in 0..count {
                 let shared = covariances.shared.diagonal();
                 let frames = covariances.frames.iter().flat_map(|c| c.diagonal().data.0[0]);

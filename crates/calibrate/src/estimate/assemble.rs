@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, Matrix3};
 
-use super::listed::shared;
+use super::listed::{covariance_of_all, joint_covariance};
 use super::target_map::{CornerOffset, TargetMap};
 use super::values::{
     CameraEstimate, Corner, Estimate, FrameEstimate, Parameter, TargetEstimate, ViewEstimate,
@@ -64,6 +64,7 @@ impl Estimate {
             let of_board = board_errors(minimum, whitening, loss, &found, *board_accuracy_mm);
             observed.with(of_board, drawn.as_ref())
         });
+        let of_all = covariance_of_all(calibration, minimum, &found).map(|all| all * variance);
         // Nothing below needs the equations.
         settled.minimum.normal.release_if_large();
         let Settled { minimum, whitening, .. } = &*settled;
@@ -89,7 +90,15 @@ impl Estimate {
         });
         let cameras: Vec<CameraEstimate> = cameras.collect();
         let joint = joint(&cameras, settled, observed.as_ref());
-        let shared = shared(calibration, layout, &cameras, &covariance, observed.as_ref());
+        let joint_covariance = joint_covariance(
+            calibration,
+            minimum,
+            &cameras,
+            frames,
+            &covariance,
+            of_all.as_ref(),
+            observed.as_ref(),
+        );
         let panels = problem.panels.iter().zip(&layout.panels).map(|(panel, first)| PanelPrior {
             target_from_panel: panel.target_from_panel,
             covariance: first.map(|first| {
@@ -109,7 +118,7 @@ impl Estimate {
             targets: targets.collect(),
             panels: panels.collect(),
             joint,
-            shared,
+            covariance: joint_covariance,
             shape: board_shape(minimum, &covariance, f_ratio),
             map: target_map(settled, &found.corners, variance, loss, drawn.as_ref()),
             rms_px: rms_px(cameras.iter().flat_map(CameraEstimate::corners)),

@@ -8,7 +8,7 @@
 //! 3. `uncertainty_map` is the projection uncertainty of a camera over its image. `on_rig` lists the unknowns of all cameras, on
 //!    which `depth` (distances that two cameras measure) and `pose_uncertainty` (poses of a target) depend.
 //! 4. `assemble` builds the estimate.
-//! 5. `shared` is the covariance of all unknowns that the frames share; `listed` names them.
+//! 5. `joint_covariance` is the covariance of all unknowns together; `listed` names them.
 //! 6. `corner_check` finds the corners of a measured target that their observations contradict.
 
 pub(crate) mod assemble;
@@ -16,11 +16,11 @@ pub(crate) mod corner_check;
 pub(crate) mod coverage;
 pub(crate) mod depth;
 pub(crate) mod image_circle;
+pub(crate) mod joint_covariance;
 pub(crate) mod lens_limit;
 pub(crate) mod listed;
 pub(crate) mod on_rig;
 pub(crate) mod pose_uncertainty;
-pub(crate) mod shared;
 pub(crate) mod target_map;
 pub(crate) mod uncertainty_map;
 pub(crate) mod values;

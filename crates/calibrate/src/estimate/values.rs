@@ -6,8 +6,8 @@ use std::ops::Range;
 use glam::DVec2;
 
 use super::coverage::Coverage;
+use super::joint_covariance::JointCovariance;
 use super::lens_limit::LensLimit;
-use super::shared::SharedCovariance;
 use super::target_map::TargetMap;
 use crate::adjust::finding::Finding;
 use crate::adjust::lack_of_fit::LackOfFit;
@@ -70,8 +70,8 @@ pub struct Estimate {
     /// [`camera_from_rig`](CameraEstimate::camera_from_rig) about the camera's axes (rad, mm) if it was estimated. `None`
     /// for a single camera, with splines, or with too few frames.
     pub joint: Option<ObservedCovariance>,
-    /// Covariance of all cameras, panels and targets together; `None` if nothing but poses of frames was estimated.
-    pub shared: Option<SharedCovariance>,
+    /// Covariance of all unknowns together; `None` if nothing but poses of frames was estimated.
+    pub covariance: Option<JointCovariance>,
     /// Number of iterations of the last bundle adjustment.
     pub steps: usize,
     /// The information about the first camera and the board's shape, on which proposals of views

@@ -57,6 +57,7 @@ pub struct Calibration {
     pub(crate) board_accuracy_mm: Option<f64>,
     pub(crate) hold_out: Option<usize>,
     pub(crate) distances_mm: Vec<f64>,
+    pub(crate) covariance_of_all: bool,
     /// Index of the initial lens of the model to use; `None` to use the best one.
     pub(crate) start: Option<usize>,
     /// Names of all frames in order, if this calibration contains only some of them.
@@ -144,6 +145,7 @@ impl Calibration {
             board_accuracy_mm: None,
             hold_out: None,
             distances_mm: Vec::new(),
+            covariance_of_all: false,
             start: None,
             order: Vec::new(),
             delays: None,
@@ -268,6 +270,13 @@ impl Calibration {
         Self { distances_mm, ..self }
     }
 
+    /// Sets whether [`Estimate::covariance`](crate::Estimate) contains the poses of frames and the offsets of measured corners, up to
+    /// [`JointCovariance::MOST_UNKNOWNS`](crate::JointCovariance::MOST_UNKNOWNS) unknowns.
+    #[must_use]
+    pub fn covariance_of_all(self, covariance_of_all: bool) -> Self {
+        Self { covariance_of_all, ..self }
+    }
+
     /// Sets a flag that stops the calibration soon after it is raised; [`Self::solve`] then returns
     /// [`CalibrationError::Stopped`].
     #[must_use]
@@ -339,6 +348,7 @@ impl Calibration {
             refine_panels: false,
             hold_out: None,
             distances_mm: Vec::new(),
+            covariance_of_all: false,
             order: Vec::new(),
             delays: None,
             symmetries: self.symmetries.clone(),

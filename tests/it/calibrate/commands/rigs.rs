@@ -52,6 +52,16 @@ fn a_pair_with_an_upside_down_camera_is_rectified_upright() {
     let said = done(at, "rectify rig.json --pair first,second -o pair");
     assert!(said.contains("a point is in the same row of both images"), "{said}");
     let pair = json(&at.join("pair/first-second.json"));
+    let positions = &pair["views"][1]["position_sd_px"];
+    let [rms, largest] = [0, 1].map(|index| positions[index].as_f64().unwrap());
+    assert!(rms > 0.0 && rms < largest && largest < 1.0, "{positions}");
+    let poses = json(&at.join("rig.json"))["pose_uncertainty"].clone();
+    let named = ["first", "second"].map(|name| {
+        poses.as_array().unwrap().iter().filter(move |of| of["camera"] == name).count()
+    });
+    assert_eq!(named, [1, 1], "{poses}");
+    let several = "--camera: rig.json: this file contains 2 cameras; use `deltille rectify`";
+    refused(at, "undistort --camera rig.json", &[several]);
     // Their diagonals are 1 without a rotation.
     let upright: Vec<f64> = [0, 4, 8]
         .map(|place| pair["views"][0]["view_from_camera"][place].as_f64().unwrap())

@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, ensure};
 
 use crate::output::{self, Overwrite, log};
-use deltille::calibrate::Estimate;
+use deltille::calibrate::{Estimate, JointCovariance};
 use deltille::export::covariance::CovarianceFormat;
 use deltille::export::kind::Kind;
 
 /// The option with the file.
 #[derive(clap::Args)]
 pub struct CovarianceArgs {
-    /// Write the covariance of all estimated parameters and poses of cameras, panels and targets, with names and units:
-    /// a .csv, .npz or .json file
+    /// Write the covariance of all estimated parameters, poses and measured corners, with names and units: a .csv, .npz or .json
+    /// file
     #[arg(long, value_name = "FILE")]
     covariance: Option<PathBuf>,
 }
@@ -34,6 +34,11 @@ impl CovarianceArgs {
         overwrite.check(path, &Kind::of(&format.sample())).context(OPTION)
     }
 
+    /// Whether the covariance is to be written.
+    pub fn is_wanted(&self) -> bool {
+        self.covariance.is_some()
+    }
+
     /// Writes the file and returns its path. A failed calibration has no covariance.
     pub fn write(
         &self,
@@ -46,11 +51,17 @@ impl CovarianceArgs {
             log!("warning: {OPTION}: not written, because the calibration failed");
             return Ok(None);
         }
-        let Some(shared) = &estimate.shared else {
+        let Some(covariance) = &estimate.covariance else {
             log!("warning: {OPTION}: not written, because only poses of views were estimated");
             return Ok(None);
         };
-        output::write(path, &format_of(path)?.write(shared), overwrite).context(OPTION)?;
+        if covariance.shared == covariance.unknowns.len() {
+            log!(
+                "note: {OPTION}: without poses of views and offsets of corners, because these are more than {} unknowns",
+                JointCovariance::MOST_UNKNOWNS
+            );
+        }
+        output::write(path, &format_of(path)?.write(covariance), overwrite).context(OPTION)?;
         Ok(Some(path.clone()))
     }
 }

@@ -258,6 +258,7 @@ impl SolveArgs {
             .board_shape(self.board_shape)
             .measure_target(self.measure_target)
             .distances_mm(self.uncertainty_at.clone())
+            .covariance_of_all(self.covariance.is_wanted())
             .hold_out(self.holdout.map(|every| every as usize));
         let estimate = calibration.solve().map_err(|error| {
             let option = match error {

@@ -1,12 +1,13 @@
-//! The covariance of all cameras, panels and targets as JSON (schema `deltille/covariance/1`), CSV, or arrays of NumPy.
+//! The covariance of all unknowns of a calibration as JSON (schema `deltille/covariance/1`), CSV, or arrays of NumPy.
 
+use std::borrow::Cow;
 use std::fmt::Write as _;
 
 use serde::Serialize;
 
 use crate::export::detections::npy::{float64, texts};
 use crate::export::writing::zip::zip;
-use deltille_calibrate::{Matrix, SharedCovariance, SharedUnknown};
+use deltille_calibrate::{JointCovariance, JointUnknown, Matrix};
 use deltille_core::json;
 
 /// Schema and version that this crate writes.
@@ -17,7 +18,7 @@ pub const SCHEMA: &str = "deltille/covariance/1";
 pub enum CovarianceFormat {
     /// A line for each pair of unknowns.
     Csv,
-    /// Arrays of NumPy: `names` and `units` (n), `noise` and `observed` (n × n).
+    /// Arrays of NumPy: `names` and `units` (n), `noise` and `observed` (n × n, NaN where it is not known).
     Npz,
     /// The names, the units, and the rows of the matrices.
     Json,
@@ -28,9 +29,9 @@ struct CovarianceFile<'a> {
     schema: &'static str,
     names: Vec<&'a str>,
     units: Vec<&'a str>,
-    noise: Vec<Vec<f64>>,
+    noise: Vec<Vec<Option<f64>>>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    observed: Option<Vec<Vec<f64>>>,
+    observed: Option<Vec<Vec<Option<f64>>>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     observed_freedom: Option<f64>,
 }
@@ -47,7 +48,7 @@ impl CovarianceFormat {
     }
 
     /// Returns the content of a file.
-    pub fn write(self, of: &SharedCovariance) -> Vec<u8> {
+    pub fn write(self, of: &JointCovariance) -> Vec<u8> {
         match self {
             Self::Csv => csv(of).into_bytes(),
             Self::Npz => npz(of),
@@ -67,17 +68,32 @@ impl CovarianceFormat {
 
 const HEAD: &str = "row,column,unit,noise,observed\n";
 
-fn csv(of: &SharedCovariance) -> String {
+fn csv(of: &JointCovariance) -> String {
     let mut text = HEAD.to_owned();
     for (i, row) in of.unknowns.iter().enumerate() {
         for (j, column) in of.unknowns.iter().enumerate() {
-            let observed = of.observed.as_ref().map_or(String::new(), |m| m[(i, j)].to_string());
+            let observed = of.observed.as_ref().and_then(|matrix| entry(matrix, i, j));
+            let observed = observed.map_or(String::new(), |value| value.to_string());
             let (noise, unit) = (of.noise[(i, j)], product(row.unit, column.unit));
+            let [row, column] = [row, column].map(|of| quoted(&of.name));
             // Writing to a string does not fail.
-            let _ = writeln!(text, "{},{},{unit},{noise},{observed}", row.name, column.name);
+            let _ = writeln!(text, "{row},{column},{unit},{noise},{observed}");
         }
     }
     text
+}
+
+/// An entry of a matrix; `None` beyond its end, where the observed covariance is not known.
+fn entry(matrix: &Matrix, i: usize, j: usize) -> Option<f64> {
+    (i.max(j) < matrix.rows()).then(|| matrix[(i, j)])
+}
+
+/// A field of a line of CSV (RFC 4180): names of frames come from names of files.
+fn quoted(name: &str) -> Cow<'_, str> {
+    match name.contains([',', '"', '\n', '\r']) {
+        true => format!("\"{}\"", name.replace('"', "\"\"")).into(),
+        false => name.into(),
+    }
 }
 
 /// The product of two units.
@@ -89,7 +105,7 @@ fn product(row: &str, column: &str) -> String {
     }
 }
 
-fn npz(of: &SharedCovariance) -> Vec<u8> {
+fn npz(of: &JointCovariance) -> Vec<u8> {
     let (names, units) = labels(of);
     let noise = Some(("noise.npy", &of.noise));
     let observed = of.observed.as_ref().map(|matrix| ("observed.npy", matrix));
@@ -99,19 +115,20 @@ fn npz(of: &SharedCovariance) -> Vec<u8> {
 fn arrays(names: &[&str], units: &[&str], matrices: &[(&str, &Matrix)]) -> Vec<u8> {
     let labels = [("names.npy", texts(names)), ("units.npy", texts(units))];
     let matrices = matrices.iter().map(|&(name, matrix)| {
-        let n = matrix.rows();
-        let values = (0..n).flat_map(|i| (0..n).map(move |j| matrix[(i, j)]));
+        let n = names.len();
+        let value = move |i, j| entry(matrix, i, j).unwrap_or(f64::NAN);
+        let values = (0..n).flat_map(|i| (0..n).map(move |j| value(i, j)));
         (name, float64(n, n, values))
     });
     let parts: Vec<(&str, Vec<u8>)> = labels.into_iter().chain(matrices).collect();
     zip(&parts.iter().map(|(name, bytes)| (*name, bytes.as_slice(), false)).collect::<Vec<_>>())
 }
 
-fn file(of: &SharedCovariance) -> CovarianceFile<'_> {
+fn file(of: &JointCovariance) -> CovarianceFile<'_> {
     let (names, units) = labels(of);
-    let rows = |matrix: &Matrix| -> Vec<Vec<f64>> {
-        let n = matrix.rows();
-        (0..n).map(|i| (0..n).map(|j| matrix[(i, j)]).collect()).collect()
+    let n = of.unknowns.len();
+    let rows = |matrix: &Matrix| -> Vec<Vec<Option<f64>>> {
+        (0..n).map(|i| (0..n).map(|j| entry(matrix, i, j)).collect()).collect()
     };
     CovarianceFile {
         schema: SCHEMA,
@@ -123,6 +140,6 @@ fn file(of: &SharedCovariance) -> CovarianceFile<'_> {
     }
 }
 
-fn labels(of: &SharedCovariance) -> (Vec<&str>, Vec<&str>) {
-    of.unknowns.iter().map(|SharedUnknown { name, unit, .. }| (name.as_str(), *unit)).unzip()
+fn labels(of: &JointCovariance) -> (Vec<&str>, Vec<&str>) {
+    of.unknowns.iter().map(|JointUnknown { name, unit, .. }| (name.as_str(), *unit)).unzip()
 }
