@@ -16,6 +16,7 @@ from ._core import (
     CalibratedCamera,
     Calibration,
     Camera,
+    CameraTiming,
     Charuco,
     Check,
     Checkerboard,
@@ -47,6 +48,7 @@ from ._core import (
     Tag,
     Target,
     Tetrahedron,
+    Timing,
     Tracker,
     Truth,
     Verdict,
@@ -64,6 +66,7 @@ from ._core import (
     render,
     rig,
     search_family,
+    timing,
 )
 from ._detections import opencv_points as _opencv_points
 from ._detections import plot as _plot
@@ -100,6 +103,7 @@ __all__ = [
     "Calibration",
     "CalibrationError",
     "Camera",
+    "CameraTiming",
     "CameraError",
     "Charuco",
     "Check",
@@ -142,6 +146,7 @@ __all__ = [
     "Target",
     "TargetError",
     "Tetrahedron",
+    "Timing",
     "Tracker",
     "Truth",
     "Verdict",
@@ -163,5 +168,6 @@ __all__ = [
     "rig",
     "search_family",
     "stereo_to_opencv",
+    "timing",
     "to_opencv",
 ]

@@ -35,6 +35,7 @@ __all__ = [
     "CalibratedCamera",
     "Calibration",
     "Camera",
+    "CameraTiming",
     "Charuco",
     "Check",
     "Checkerboard",
@@ -67,6 +68,7 @@ __all__ = [
     "Tag",
     "Target",
     "Tetrahedron",
+    "Timing",
     "Tracker",
     "Truth",
     "Verdict",
@@ -94,6 +96,7 @@ __all__ = [
     "render",
     "rig",
     "search_family",
+    "timing",
 ]
 
 __version__: str
@@ -1246,6 +1249,42 @@ def accept(
     assume_target: bool = False,
     board_accuracy_mm: float | None = None,
 ) -> Acceptance: ...
+@final
+class CameraTiming:
+    @property
+    def name(self) -> str: ...
+    @property
+    def readout_s(self) -> tuple[float, float] | None: ...
+    @property
+    def is_rolling(self) -> bool: ...
+    @property
+    def shear_px(self) -> float: ...
+    @property
+    def offset_s(self) -> tuple[float, float] | None: ...
+    @property
+    def drift(self) -> tuple[float, float] | None: ...
+    @property
+    def frames(self) -> int: ...
+
+@final
+class Timing:
+    @property
+    def cameras(self) -> list[CameraTiming]: ...
+    @property
+    def frames(self) -> int: ...
+    @property
+    def rms_px(self) -> float: ...
+    @property
+    def speed_px_s(self) -> float: ...
+    def to_json(self) -> str: ...
+
+def timing(
+    calibration: CalibratedCamera | Rig,
+    detections: Iterable[Detection | Failure] | Mapping[str, Sequence[Detection | Failure]],
+    target: Target | Sequence[Target] | None = None,
+    *,
+    assume_target: bool = False,
+) -> Timing: ...
 @final
 class HandEye:
     @property

@@ -69,6 +69,8 @@ mod _core {
     #[pymodule_export]
     use super::calibrate::robots::{HandEye, hand_eye_of};
     #[pymodule_export]
+    use super::calibrate::timing::{CameraTiming, Timing, timing_of};
+    #[pymodule_export]
     use super::calibrate::views::{Diagnosis, Excluded, View};
     #[pymodule_export]
     use super::programs::_run;

@@ -1,4 +1,5 @@
 import json
+import math
 import pickle
 import subprocess
 
@@ -187,6 +188,38 @@ def test_acceptance(calibration, detections, board):
         deltille.accept(known, detections[1::2], lengths=[(ends[0], (1, 99), 100.0, 0.001)])
     with pytest.raises(deltille.CalibrationError, match="used for the calibration"):
         deltille.accept(known, detections[::2])
+
+
+def test_timing(calibration, detections, board, camera):
+    readout_s, template = 0.01, json.loads(detections[0].to_json())
+    generator = numpy.random.default_rng(1)
+    frames = []
+    for index in range(60):
+
+        def seen(at_s):
+            eye = (70 + 60 * math.sin(3 * at_s), 60 + 50 * math.cos(2.5 * at_s), 350 + 20 * math.sin(2 * at_s))
+            pose = deltille.Pose.looking_at(eye, (70, 60, 0))
+            return camera.project(board.corners @ pose.rotation.T + pose.tvec)
+
+        pixels = seen(index / 30)
+        for _ in range(4):
+            # The row of a corner is exposed when the corner is there.
+            at_s = index / 30 + readout_s * (pixels[:, 1] / camera.height - 0.5)
+            pixels = numpy.array([seen(at)[i] for i, at in enumerate(at_s)])
+        pixels = pixels + generator.normal(0, 0.02, pixels.shape)
+        at = dict(zip(zip(board.corner_rows.tolist(), board.corner_cols.tolist()), pixels.tolist()))
+        for corner in template["grids"][0]["corners"]:
+            corner["x"], corner["y"] = at[corner["row"], corner["col"]]
+            corner["cov"] = [4e-4, 0, 4e-4]
+        template["image"], template["time_ns"] = f"{index:03}", round(index / 30 * 1e9)
+        frames.append(deltille.Detection.from_json(json.dumps(template)))
+    found = deltille.timing(calibration, frames, board)
+    (only,) = found.cameras
+    value, sd = only.readout_s
+    assert only.is_rolling and abs(value - readout_s) < 4 * sd + 5e-5 and sd < 5e-4 and only.offset_s is None
+    assert found.rms_px < 0.05 and json.loads(found.to_json())["frames"] == found.frames > 50
+    with pytest.raises(deltille.CalibrationError, match="no time stamps"):
+        deltille.timing(calibration, detections, board)
 
 
 def test_rigs(board, camera, tmp_path):

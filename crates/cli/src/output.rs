@@ -14,6 +14,7 @@ use deltille_core::words::shown;
 /// that folder. A path with another extension is not a folder, unless it exists as one.
 pub fn file(output: &Path, stem: &str, extension: &str) -> anyhow::Result<PathBuf> {
     let shown = output.display();
+    check_is_path(output).context("-o")?;
     if output.is_dir() {
         return Ok(output.join(format!("{stem}.{extension}")));
     }
@@ -211,8 +212,16 @@ pub fn folder_of(path: &Path) -> &Path {
 const OF_FILES: &str = "3mf cameramodel csv dsc dxf glb gltf html jpeg jpg json mtl ndjson npy obj orpc parquet pdf ply \
                         png sdf stl svg tif tiff toml txt urdf usda xml yaml yml";
 
+/// Rejects `-`, which other programs take for standard output.
+fn check_is_path(output: &Path) -> anyhow::Result<()> {
+    let problem = "`-` is not a file: results are not written to standard output; name a file, or a folder such as ./-";
+    ensure!(output.as_os_str() != "-", problem);
+    Ok(())
+}
+
 /// Rejects a folder if a file exists at its path, or if it is new and has the name of a file.
 pub fn check_folder(folder: &Path) -> anyhow::Result<()> {
+    check_is_path(folder)?;
     if let Some(file) = folder.ancestors().find(|part| part.exists() && !part.is_dir()) {
         bail!("{} is a file, but a folder is needed", file.display());
     }

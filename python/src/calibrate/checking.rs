@@ -284,15 +284,8 @@ pub(super) fn new_views(
         Reference::Target(_) => None,
     };
     let reference = made.as_ref().map_or_else(|| seen.reference(), Reference::Target);
-    if let (Some(target), [first, ..], false) =
-        (reference.targets().first(), before.calibrated_with.as_slice(), assume_target)
-        && !before.calibrated_with.contains(&target.identity())
-    {
-        let own = target.identity();
-        let what = format!(
-            "the calibration was made with {first}, not with {own}; pass the right target, or assume_target=True"
-        );
-        return Err(wrong(&what));
+    if let Some(target) = reference.targets().first() {
+        check_target(&before, target, assume_target)?;
     }
     let mut sheet = how.sheet;
     if let [only] = seen.printed() {
@@ -316,8 +309,25 @@ pub(super) fn new_views(
     Ok((before, checked, target))
 }
 
+/// Rejects another target than that of the calibration.
+pub(super) fn check_target(
+    before: &Estimate,
+    target: &Target,
+    assume_target: bool,
+) -> PyResult<()> {
+    let own = target.identity();
+    match before.calibrated_with.as_slice() {
+        [first, ..] if !assume_target && !before.calibrated_with.contains(&own) => {
+            Err(raised::CalibrationError::new_err(format!(
+                "the calibration was made with {first}, not with {own}; pass the right target, or assume_target=True"
+            )))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// The earlier calibration; without uncertainties if it failed.
-fn before(given: &Bound<'_, PyAny>) -> PyResult<Estimate> {
+pub(super) fn before(given: &Bound<'_, PyAny>) -> PyResult<Estimate> {
     let of = |cameras: Vec<CameraEstimate>, solved: &Solved| {
         let mut before = Estimate::default();
         before.cameras = cameras;
@@ -340,7 +350,7 @@ fn before(given: &Bound<'_, PyAny>) -> PyResult<Estimate> {
 }
 
 /// The detections of each camera.
-fn given(
+pub(super) fn given(
     py: Python<'_>,
     before: &Estimate,
     detections: &Bound<'_, PyAny>,

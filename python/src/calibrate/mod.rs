@@ -11,7 +11,8 @@
 //! 6. `comparison` tests whether two calibrations differ, and estimates the pose of a target.
 //! 7. `checking` tests whether cameras are still as calibrated, from a few new detections.
 //! 8. `accepting` measures known lengths, with the arguments of `checking`.
-//! 9. `robots` locates a camera and a board on a robot.
+//! 9. `timing` estimates rolling shutters and the clocks of a rig.
+//! 10. `robots` locates a camera and a board on a robot.
 
 pub mod accepting;
 pub mod calibrated_camera;
@@ -23,4 +24,5 @@ pub mod next_view;
 mod pickled;
 pub mod robots;
 mod solving;
+pub mod timing;
 pub mod views;

@@ -37,7 +37,7 @@ pub enum Constraint {
 }
 
 const FIXED: &str = "a parameter, such as k3, or a parameter with its value, such as k3=0.01";
-const EQUAL: &str = "two or more different parameters, such as fx,fy";
+const EQUAL: &str = "two or more different parameters of one camera, such as fx,fy";
 const PRIOR: &str =
     "a parameter with its value and standard deviation, such as cx=960±2 or cx=960+-2";
 

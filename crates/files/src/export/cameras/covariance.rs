@@ -39,7 +39,7 @@ struct CovarianceFile<'a> {
 impl CovarianceFormat {
     /// The format of a file with this extension.
     pub fn of_extension(extension: &str) -> Option<Self> {
-        match extension {
+        match extension.to_ascii_lowercase().as_str() {
             "csv" => Some(Self::Csv),
             "npz" => Some(Self::Npz),
             "json" => Some(Self::Json),
