@@ -58,6 +58,7 @@ def matrix(rotation):
 
 
 def write(name, views, rng):
+    """Writes detections with noise, and returns the pixels."""
     place = folder / name
     place.mkdir(exist_ok=True)
     for index, pixels in enumerate(views):
@@ -69,6 +70,7 @@ def write(name, views, rng):
         grid = {"kind": "checker", "panel": 0, "corners": found, "tags": []}
         record = {"schema": "deltille/detection/1", "image": f"{index:03}.png", "width": SIZE[0], "height": SIZE[1]}
         json.dump({**record, "grids": [grid], "tone": None, "ink": None}, open(place / f"{index:03}.json", "w"))
+    return np.concatenate(views)
 
 
 def views(rng, cameras):
@@ -94,10 +96,10 @@ def lens(found):
     return intrinsic, np.array([value.get(name, 0.0) for name in ("k1", "k2", "p1", "p2", "k3")])
 
 
-def tilted(distance, rng):
-    """A pose whose centre is at a distance in a random direction of the image, tilted by 30° about a random axis."""
+def tilted(distance, rng, corners):
+    """A pose whose centre is at a distance, where a corner was detected, tilted by 30° about a random axis."""
     while True:
-        pixel = rng.uniform((0, 0), SIZE)
+        pixel = corners[rng.integers(len(corners))]
         flat = cv2.undistortPoints(pixel[None, None], K, LENS)[0, 0]
         sight = np.array([*flat, 1]) / np.linalg.norm([*flat, 1])
         up = np.array([0, -1, 0]) + sight * sight[1]
@@ -151,7 +153,7 @@ def sd(record):
 
 for seed in range(runs):
     rng = np.random.default_rng(seed)
-    write("one", [project(vector(r), t) for r, t in views(rng, [ZERO])], rng)
+    corners = write("one", [project(vector(r), t) for r, t in views(rng, [ZERO])], rng)
     command = ["calibrate", folder / "one", "--target", folder / "board/board.json", "--model", "radtan", "--force"]
     command += ["--board-accuracy", "0", "--uncertainty-at", ",".join(f"{d}mm" for d in DISTANCES)]
     run(*command, "-o", folder / "camera.yaml")
@@ -160,7 +162,7 @@ for seed in range(runs):
     assert [of["distance_mm"] for of in found["pose_uncertainty"]] == DISTANCES
     for of in found["pose_uncertainty"]:
         for _ in range(24):
-            rotation, translation, sight = tilted(of["distance_mm"], rng)
+            rotation, translation, sight = tilted(of["distance_mm"], rng, corners)
             pixels = project(vector(rotation), translation)
             seen = inside(pixels)
             pose = pnp(pixels, seen, estimated, (rotation, translation))
@@ -177,7 +179,10 @@ for seed in range(runs):
     maps = [np.load(folder / f"view/camera-undistorted-map-{axis}.npy") for axis in "xy"]
     rows, columns = np.mgrid[0 : view["height"] : 40, 0 : view["width"] : 40]
     source = np.stack([m[rows, columns] for m in maps], axis=-1).reshape(-1, 1, 2).astype(float)
-    ok = (source >= 0).all(axis=(1, 2))
+    # The image is divided into 10 × 8 blocks; those without corners are left out.
+    block = np.array(SIZE) / (10, 7.5)
+    seen = {tuple(of) for of in ((corners + 0.5) // block).astype(int)}
+    ok = (source >= 0).all(axis=(1, 2)) & [tuple(of) in seen for of in ((source[:, 0] + 0.5) // block).astype(int)]
     true = cv2.undistortPoints(source[ok], K, LENS)[:, 0]
     flat = (np.stack([columns, rows], axis=-1).reshape(-1, 2)[ok] - view["centre_px"]) / view["focal_px"]
     true, flat = (np.column_stack([of, np.ones(len(of))]) for of in (true, flat))
@@ -187,11 +192,11 @@ for seed in range(runs):
         return view["focal_px"] * (turned[:, :2] / turned[:, 2:] - flat[:, :2])
 
     turn = least_squares(lambda turn: off(turn).ravel(), np.zeros(3), x_scale=1e-3).x
-    note("undistorted positions", np.array([np.mean(off(turn) ** 2)]), view["position_sd_px"][:1])
+    note("undistorted positions", np.array([np.mean(off(turn) ** 2)]), [view["position_sd_px"]])
 
     poses = views(rng, [ZERO, RIGHT])
-    for name, camera in (("left", ZERO), ("right", RIGHT)):
-        write(name, [project(*seen_by(camera, r, t)) for r, t in poses], rng)
+    cameras = {"left": ZERO, "right": RIGHT}
+    corners = {name: write(name, [project(*seen_by(of, r, t)) for r, t in poses], rng) for name, of in cameras.items()}
     command = ["rig", "--camera", f"left={folder / 'left'}", "--camera", f"right={folder / 'right'}", "--model", "radtan", "--force"]
     command += ["--board-accuracy", "0", "--uncertainty-at", "600mm", "--target", folder / "board/board.json"]
     run(*command, "-o", folder / "rig")
@@ -202,7 +207,7 @@ for seed in range(runs):
     motions = [(vector(np.reshape(m["rotation"], (3, 3))), np.array(m["translation_mm"])) for m in motions]
     estimated = list(zip(map(lens, found["cameras"]), motions))
     for _ in range(16):
-        rotation, translation, sight = tilted(600.0, rng)
+        rotation, translation, sight = tilted(600.0, rng, corners["left"])
         images = [project(*seen_by(camera, rotation, translation)) for camera in (ZERO, RIGHT)]
         seen = [inside(pixels) for pixels in images]
         pose = rig_pose(images, seen, estimated, (rotation, translation))

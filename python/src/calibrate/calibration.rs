@@ -124,7 +124,8 @@ macro_rules! whole {
             /// tuple of two tuples of three floats, or None
             ///     Standard deviations of the rotation (rad, RMS of three axes), and of the position of the centre across (RMS of two
             ///     directions) and along the line of sight (mm): from the calibration; and from noise of the pixels, for each px of noise
-            ///     per coordinate. RMS values over the positions at which the whole target is in the image, tilted by 30°.
+            ///     per coordinate. RMS values over positions of the centre where corners were detected, with the whole
+            ///     target in the image, tilted by 30°.
             ///     ``None`` if not known, or if there are no such positions.
             #[pyo3(signature = (target, distance_mm, camera=None))]
                     fn target_pose_sd(
@@ -364,7 +365,7 @@ impl Rig {
     /// -------
     /// tuple of two floats, or None
     ///     Standard deviation from the calibration, mm; and from noise of the pixels, mm for each px of noise per
-    ///     coordinate: RMS values over the points that both cameras see. ``None`` if not known, or if there are no such
+    ///     coordinate: RMS values over points that both cameras see, where the first one detected corners. ``None`` if not known, or if there are no such
     ///     points.
     fn depth_sd(
         &self,

@@ -1,10 +1,15 @@
 //! Numbers of corners in the parts of an image, for estimates that do not list the corners
 //! themselves.
 
+use std::collections::BTreeMap;
+
 use glam::DVec2;
 
 /// Number of cells along the longer side of the image.
 const CELLS: f64 = 40.0;
+
+/// Number of cells along the side of a block.
+const BLOCK: u32 = 4;
 
 /// Numbers of corners in the cells of an image, without outliers.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -53,5 +58,29 @@ impl Coverage {
             let (row, column) = (index / self.columns, index % self.columns);
             (step * (DVec2::new(column as f64, row as f64) + 0.5) - 0.5, count)
         })
+    }
+
+    /// Whether corners were detected in the block of cells at a position, px, in an image of this size.
+    pub(crate) fn has_corners(&self, place: DVec2, size: DVec2) -> bool {
+        let block = |place: DVec2| ((place + 0.5) / self.block(size)).as_ivec2();
+        self.places(size).any(|(other, _)| block(other) == block(place))
+    }
+
+    /// The size of a block of cells in an image of this size, px.
+    fn block(&self, size: DVec2) -> DVec2 {
+        size * f64::from(BLOCK) / DVec2::new(self.columns as f64, self.rows as f64)
+    }
+
+    /// The centres of gravity, px, and the numbers of corners of blocks of cells: at most 10 × 10 positions that represent the corners
+    /// of an image of this size.
+    pub(crate) fn blocks(&self, size: DVec2) -> Vec<(DVec2, f64)> {
+        let mut blocks = BTreeMap::new();
+        for (place, count) in self.places(size) {
+            let block = ((place + 0.5) / self.block(size)).as_ivec2().to_array();
+            let (sum, all) = blocks.entry(block).or_insert((DVec2::ZERO, 0.0));
+            *sum += place * f64::from(count);
+            *all += f64::from(count);
+        }
+        blocks.into_values().map(|(sum, all)| (sum / all, all)).collect()
     }
 }

@@ -12,16 +12,14 @@
 use glam::{DMat3, DVec2, DVec3};
 use nalgebra::{DMatrix, Matrix3, RowDVector, SMatrix, Vector3};
 
+use super::coverage::Coverage;
 use super::on_rig::CameraOnRig;
 use super::values::Estimate;
 use crate::uncertainty::projection::seen_at;
 use deltille_core::camera::Pose;
 
-/// Number of positions along the longer side of an image.
-const POSITIONS: usize = 12;
-
-/// The uncertainty of a triangulated distance: RMS values over the points at this distance from the first camera that both
-/// cameras see.
+/// The uncertainty of a triangulated distance: RMS values over points at this distance from the first camera that both cameras
+/// see, where the first one detected the corners of the calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct DepthUncertainty {
@@ -44,18 +42,15 @@ impl Estimate {
         let (all, observed) = self.cameras_on_rig()?;
         let covariance = observed.covariance.inner();
         let pair = [all.get(cameras[0])?, all.get(cameras[1])?];
-        let size = pair[0].estimate.size_px();
-        let parts = (size * POSITIONS as f64 / size.max_element()).round().max(DVec2::ONE);
         let (mut variance, mut noise, mut count) = (0.0, 0.0, 0.0);
-        for row in 0..parts.y as usize {
-            for column in 0..parts.x as usize {
-                let pixel = (DVec2::new(column as f64, row as f64) + 0.5) * size / parts - 0.5;
-                let change = Change::of(pair, pixel, distance_mm, covariance.nrows());
-                let Some(change) = change else { continue };
-                variance += (&change.by_unknowns * covariance * change.by_unknowns.transpose())[0];
-                noise += change.noise_mm2;
-                count += 1.0;
-            }
+        let first = pair[0].estimate;
+        for (pixel, corners) in Coverage::of(first).blocks(first.size_px()) {
+            let change = Change::of(pair, pixel, distance_mm, covariance.nrows());
+            let Some(change) = change else { continue };
+            let of_calibration = &change.by_unknowns * covariance * change.by_unknowns.transpose();
+            variance += corners * of_calibration[0];
+            noise += corners * change.noise_mm2;
+            count += corners;
         }
         (count > 0.0).then(|| DepthUncertainty {
             distance_mm,
@@ -156,6 +151,7 @@ mod tests {
                 translation: DVec3::new(-120.0, 4.0, 7.0) * index as f64,
             };
             of.pose_sd = (index > 0).then_some([1.0; 6]);
+            of.coverage = Coverage::new(8, 6, vec![1; 48]);
             of
         };
         let cameras: Vec<CameraEstimate> = (0..3).map(camera).collect();

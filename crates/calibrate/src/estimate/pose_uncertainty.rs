@@ -11,17 +11,15 @@
 
 use std::f64::consts::FRAC_PI_4;
 
-use glam::{DMat3, DQuat, DVec2, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix};
 
+use super::coverage::Coverage;
 use super::on_rig::CameraOnRig;
 use super::values::Estimate;
 use crate::uncertainty::projection::{seen_at, solved};
 use deltille_core::camera::Pose;
 use deltille_core::targets::Target;
-
-/// Number of positions along the longer side of an image.
-const POSITIONS: usize = 8;
 
 /// Tilt of the target against the direction in which it is seen, rad (30°). The rotation of a target that faces the camera is
 /// much less certain.
@@ -30,8 +28,8 @@ const TILT: f64 = std::f64::consts::FRAC_PI_6;
 /// Number of corners that determine a pose without doubt.
 const LEAST_CORNERS: usize = 6;
 
-/// The uncertainty of a pose: RMS values over the positions at this distance at which the camera sees the whole target, tilted by
-/// 30°.
+/// The uncertainty of a pose: RMS values over positions at this distance at which the camera sees the whole target, tilted by 30°. The
+/// centre of the target is where the corners of the calibration were detected.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct PoseUncertainty {
@@ -73,13 +71,9 @@ impl Estimate {
         let covariance = observed.covariance.inner();
         let of = cameras.get(camera)?;
         let body = Body::of(target)?;
-        let size = of.estimate.size_px();
-        let parts = (size * POSITIONS as f64 / size.max_element()).round().max(DVec2::ONE);
-        let (columns, rows) = (parts.x as usize, parts.y as usize);
         let mut sums = [Sum::default(), Sum::default()];
-        for index in 0..columns * rows {
-            let at = DVec2::new((index % columns) as f64, (index / columns) as f64) + 0.5;
-            let pixel = at * size / parts - 0.5;
+        let positions = Coverage::of(of.estimate).blocks(of.estimate.size_px());
+        for (index, (pixel, corners)) in positions.into_iter().enumerate() {
             let Some(centre) = seen_at(&of.estimate.camera, pixel, Some(distance_mm)) else {
                 continue;
             };
@@ -89,9 +83,10 @@ impl Estimate {
             let seen = Seen::of(&cameras, camera, &body, &rig_from_camera.after(&pose));
             let Some(seen) = seen else { continue };
             let sight = (rig_from_camera.rotation * centre).normalize_or_zero();
-            sums[0].add(&(&seen.by_cameras * covariance * seen.by_cameras.transpose()), sight);
+            let by_calibration = &seen.by_cameras * covariance * seen.by_cameras.transpose();
+            sums[0].add(&by_calibration, sight, corners);
             let noise = seen.noise;
-            sums[1].add(&DMatrix::from_fn(6, 6, |i, j| noise[(i, j)]), sight);
+            sums[1].add(&DMatrix::from_fn(6, 6, |i, j| noise[(i, j)]), sight, corners);
         }
         let [calibration, per_px] = sums.map(|sum| sum.rms());
         Some(PoseUncertainty {
@@ -211,28 +206,28 @@ struct Sum {
     rotation: f64,
     across: f64,
     along: f64,
-    count: f64,
+    weight: f64,
 }
 
 impl Sum {
-    /// Adds the covariance of a pose whose centre is seen along a unit vector.
-    fn add(&mut self, covariance: &DMatrix<f64>, sight: DVec3) {
+    /// Adds the covariance of a pose whose centre is seen along a unit vector, with a weight.
+    fn add(&mut self, covariance: &DMatrix<f64>, sight: DVec3, weight: f64) {
         let trace = |first: usize| (first..first + 3).map(|i| covariance[(i, i)]).sum::<f64>();
         let along = (0..9).map(|k| {
             let (i, j) = (k / 3, k % 3);
             sight[i] * covariance[(3 + i, 3 + j)] * sight[j]
         });
         let along: f64 = along.sum();
-        self.rotation += trace(0) / 3.0;
-        self.across += (trace(3) - along) / 2.0;
-        self.along += along;
-        self.count += 1.0;
+        self.rotation += weight * trace(0) / 3.0;
+        self.across += weight * (trace(3) - along) / 2.0;
+        self.along += weight * along;
+        self.weight += weight;
     }
 
     /// `None` for an empty sum.
     fn rms(self) -> Option<PoseSd> {
-        let rms = |sum: f64| (sum.max(0.0) / self.count).sqrt();
-        (self.count > 0.0).then(|| PoseSd {
+        let rms = |sum: f64| (sum.max(0.0) / self.weight).sqrt();
+        (self.weight > 0.0).then(|| PoseSd {
             rotation_rad: rms(self.rotation),
             across_mm: rms(self.across),
             along_mm: rms(self.along),
@@ -248,6 +243,7 @@ mod tests {
     use crate::uncertainty::projection::ObservedCovariance;
     use deltille_core::camera::{BrownConrady, Camera, Lens};
     use deltille_core::targets::BoardSpec;
+    use glam::DVec2;
 
     fn board() -> Target {
         Target::new("board", BoardSpec::deltille(8, 10, 20.0)).unwrap()
@@ -266,6 +262,7 @@ mod tests {
                 translation: DVec3::new(-120.0, 4.0, 7.0) * index as f64,
             };
             of.pose_sd = (index > 0).then_some([1.0; 6]);
+            of.coverage = Coverage::new(8, 6, vec![1; 48]);
             of
         };
         let unknowns = if count == 1 { 4 } else { 14 };

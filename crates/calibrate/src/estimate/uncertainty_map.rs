@@ -2,6 +2,7 @@
 
 use glam::{DMat2, DVec2};
 
+use super::coverage::Coverage;
 use super::values::CameraEstimate;
 use crate::matrix::Matrix;
 use crate::uncertainty::projection::{Source, by_motion, by_parameters, seen_at};
@@ -118,25 +119,26 @@ impl CameraEstimate {
         found.is_finite().then(|| found.to_cols_array_2d())
     }
 
-    /// Standard deviation of positions in an undistorted view, px: RMS per axis over the view, and the largest one along any
-    /// direction. `None` if it is not known.
+    /// Standard deviation of positions in an undistorted view, px: the RMS per axis where corners were detected; and the fraction of the
+    /// view in which they were. Elsewhere the lens is extrapolated. `None` if it is not known.
     pub fn undistorted_sd_px(&self, view: &Undistortion, source: Source) -> Option<[f64; 2]> {
-        let [width, height] = [view.view().width, view.view().height].map(f64::from);
-        let size = DVec2::new(width, height);
+        let size = DVec2::new(f64::from(view.view().width), f64::from(view.view().height));
         let steps = (size * POSITIONS as f64 / size.max_element()).round().max(DVec2::ONE);
-        let (mut sum, mut count, mut largest) = (0.0, 0.0, 0.0);
+        let coverage = Coverage::of(self);
+        let (mut sum, mut seen, mut all) = (0.0, 0.0, 0.0);
         for row in 0..=steps.y as usize {
             for column in 0..=steps.x as usize {
                 let pixel = DVec2::new(column as f64, row as f64) * (size - 1.0) / steps;
-                let Some(found) = self.undistorted_covariance(view, pixel, source) else {
-                    continue;
-                };
-                sum += f64::midpoint(found[0][0], found[1][1]);
-                count += 1.0;
-                largest = f64::max(largest, worst(found));
+                let Some(at) = view.source(pixel) else { continue };
+                all += 1.0;
+                if coverage.has_corners(at, self.size_px()) {
+                    let found = self.undistorted_covariance(view, pixel, source)?;
+                    sum += f64::midpoint(found[0][0], found[1][1]);
+                    seen += 1.0;
+                }
             }
         }
-        (count > 0.0).then(|| [(sum / count).sqrt(), largest.sqrt()])
+        (seen > 0.0).then(|| [(sum / seen).sqrt(), seen / all])
     }
 
     /// Standard deviation of a projection per axis, px: the RMS over the detected corners. `None` if it is not known.

@@ -52,9 +52,10 @@ fn a_pair_with_an_upside_down_camera_is_rectified_upright() {
     let said = done(at, "rectify rig.json --pair first,second -o pair");
     assert!(said.contains("a point is in the same row of both images"), "{said}");
     let pair = json(&at.join("pair/first-second.json"));
-    let positions = &pair["views"][1]["position_sd_px"];
-    let [rms, largest] = [0, 1].map(|index| positions[index].as_f64().unwrap());
-    assert!(rms > 0.0 && rms < largest && largest < 1.0, "{positions}");
+    let view = &pair["views"][1];
+    let [sd, fraction] =
+        ["position_sd_px", "calibrated_fraction"].map(|name| view[name].as_f64().unwrap());
+    assert!(sd > 0.0 && sd < 1.0 && fraction > 0.1 && fraction < 1.0, "{sd} {fraction}");
     let poses = json(&at.join("rig.json"))["pose_uncertainty"].clone();
     let named = ["first", "second"].map(|name| {
         poses.as_array().unwrap().iter().filter(move |of| of["camera"] == name).count()

@@ -194,16 +194,18 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     made.end(staged)
 }
 
-/// Returns the standard deviations of positions in a view that are due to the calibration of its camera.
+/// Returns the standard deviation of positions in a view that is due to the calibration of its camera, and the calibrated fraction of
+/// the view.
 fn position_sd(camera: &CameraEstimate, view: &Undistortion) -> Option<[f64; 2]> {
     let from = |source| camera.undistorted_sd_px(view, source);
     from(Source::Observed).or_else(|| from(Source::Noise))
 }
 
-/// Describes these standard deviations.
-fn describe_sd([rms, largest]: [f64; 2]) -> String {
+/// Describes this standard deviation.
+fn describe_sd([sd, fraction]: [f64; 2]) -> String {
     format!(
-        "positions in it are known to {rms:.4} px (1σ, RMS per axis), and to {largest:.4} px at worst"
+        "positions are known to {sd:.4} px (1σ, RMS per axis) where the calibration saw corners, in {:.0} % of the view",
+        100.0 * fraction
     )
 }
 

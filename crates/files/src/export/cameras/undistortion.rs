@@ -38,9 +38,12 @@ struct View {
     valid_fraction: f64,
     /// x, y, width and height of the largest rectangle that the camera sees completely.
     valid_px: [usize; 4],
-    /// Standard deviation of a position that is due to the calibration: RMS per axis over the view, and the largest one.
+    /// Standard deviation of a position that is due to the calibration, where that saw corners: RMS per axis.
     #[serde(skip_serializing_if = "Option::is_none")]
-    position_sd_px: Option<[f64; 2]>,
+    position_sd_px: Option<f64>,
+    /// Fraction of its pixels where the calibration saw corners.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    calibrated_fraction: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -60,7 +63,7 @@ struct Named<'a> {
 }
 
 impl View {
-    fn of(made: &Undistortion, map: &PixelMap, position_sd_px: Option<[f64; 2]>) -> Self {
+    fn of(made: &Undistortion, map: &PixelMap, known: Option<[f64; 2]>) -> Self {
         let camera = made.view();
         let field =
             |side: u32| 2.0 * (f64::from(side) / 2.0 / camera.focal_px.x).atan().to_degrees();
@@ -74,7 +77,8 @@ impl View {
             view_from_camera: rows(made),
             valid_fraction: map.valid_fraction(),
             valid_px: map.valid_rectangle(),
-            position_sd_px,
+            position_sd_px: known.map(|[sd, _]| sd),
+            calibrated_fraction: known.map(|[_, fraction]| fraction),
         }
     }
 }
@@ -85,20 +89,20 @@ fn rows(made: &Undistortion) -> [f64; 9] {
 }
 
 /// The JSON text of an undistorted view; `map` contains the position in the photograph of each pixel of the view, and
-/// `position_sd_px` the standard deviations of
+/// `known` the result of
 /// [`CameraEstimate::undistorted_sd_px`](deltille_calibrate::CameraEstimate::undistorted_sd_px), if they are known.
-pub fn write(made: &Undistortion, map: &PixelMap, position_sd_px: Option<[f64; 2]>) -> String {
-    json::to_text(&ViewFile { schema: SCHEMA, view: View::of(made, map, position_sd_px) }, 1)
+pub fn write(made: &Undistortion, map: &PixelMap, known: Option<[f64; 2]>) -> String {
+    json::to_text(&ViewFile { schema: SCHEMA, view: View::of(made, map, known) }, 1)
 }
 
-/// The JSON text of a rectified pair, with the names of its cameras, and the map and the standard deviations of each view.
+/// The JSON text of a rectified pair, with the names of its cameras, and the map and the uncertainty of each view.
 pub fn write_pair(
     made: &Rectification,
     names: [&str; 2],
     maps: &[PixelMap; 2],
-    position_sd_px: [Option<[f64; 2]>; 2],
+    known: [Option<[f64; 2]>; 2],
 ) -> String {
-    let views = names.into_iter().zip(&made.views).zip(maps).zip(position_sd_px);
+    let views = names.into_iter().zip(&made.views).zip(maps).zip(known);
     let views =
         views.map(|(((camera, view), map), sd)| Named { camera, view: View::of(view, map, sd) });
     let file = PairFile {
