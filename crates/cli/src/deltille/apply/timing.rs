@@ -12,15 +12,11 @@ use crate::deltille::calibrate::{compensation, sightings};
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::{camera_file, target_file};
 use crate::interrupt;
-use crate::output::{self, Overwrite, log};
+use crate::output::{self, Overwrite};
 use deltille::calibrate::{Estimate, Reference, TimedCamera, timing};
 use deltille::export::kind::Kind;
 use deltille::export::timing as timing_file;
 use deltille_core::words::shown;
-
-/// Residuals are suspicious beyond this number of standard deviations of corners: blur and paths that are not smooth explain a
-/// few.
-const MISFIT: f64 = 10.0;
 
 /// Arguments of `deltille timing`.
 #[derive(clap::Args)]
@@ -103,14 +99,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(path) = &path {
         output::write(path, timing_file::write(&found).as_bytes(), args.overwrite)?;
     }
-    if found.rms_px > MISFIT * found.corner_sd_px && found.corner_sd_px > 0.0 {
-        log!(
-            "warning: residuals ({:.3} px) are many times the standard deviation of the corners ({:.3} px): check the camera, the \
-             target and the time stamps",
-            found.rms_px,
-            found.corner_sd_px
-        );
-    }
+    compensation::warn_of_misfit(&found);
     output::print(&compensation::describe(&found))?;
     if let Some(path) = &path {
         output::print(&format!("wrote {}\n", shown(&path.display().to_string())))?;

@@ -183,28 +183,35 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let map = args.view.map(&made);
     let view = CameraFile { camera: made.view().clone(), calibrated_with, failed };
     let mut files = args.view.files(&stem, &view, &map)?;
-    let sd = position_sd(known, &made);
+    let known = position_sd(known, &made);
+    let sd = known.map(|(sd, _)| sd);
     files.insert(0, text_file(format!("{stem}.json"), undistortion::write(&made, &map, sd)));
     let staged = Staged::new(&args.view.output, &files, args.view.overwrite)?;
     say!("{}", describe(made.view(), &map));
-    if let Some(sd) = sd {
-        say!("{}", describe_sd(sd));
+    if let Some(known) = known {
+        say!("{}", describe_sd(known));
     }
     let made = pictures.write(&images, &map)?;
     made.end(staged)
 }
 
-/// Returns the standard deviation of positions in a view that is due to the calibration of its camera, and the calibrated fraction of
-/// the view.
-fn position_sd(camera: &CameraEstimate, view: &Undistortion) -> Option<[f64; 2]> {
-    let from = |source| camera.undistorted_sd_px(view, source);
+/// The standard deviation of positions in a view that is due to the calibration of its camera, the calibrated fraction of the view, and
+/// the source of the uncertainty.
+type Known = ([f64; 2], Source);
+
+fn position_sd(camera: &CameraEstimate, view: &Undistortion) -> Option<Known> {
+    let from = |source| Some((camera.undistorted_sd_px(view, source)?, source));
     from(Source::Observed).or_else(|| from(Source::Noise))
 }
 
-/// Describes this standard deviation.
-fn describe_sd([sd, fraction]: [f64; 2]) -> String {
+/// Describes it.
+fn describe_sd(([sd, fraction], source): Known) -> String {
+    let from = match source {
+        Source::Noise => "from noise alone",
+        Source::Observed => "observed",
+    };
     format!(
-        "positions are known to {sd:.4} px (1σ, RMS per axis) where the calibration saw corners, in {:.0} % of the view",
+        "positions are known to {sd:.4} px (1σ, RMS per axis, {from}) where the calibration saw corners, in {:.0} % of the view",
         100.0 * fraction
     )
 }
@@ -394,20 +401,21 @@ pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
     let sample = [text_file(format!("{stem}.json"), sample_of(undistortion::PAIR_SCHEMA))];
     check_places(&args.view.output, &sample, args.view.overwrite)?;
     let maps = [&made.views[0], &made.views[1]].map(|view| args.view.map(view));
-    let sd = [position_sd(first, &made.views[0]), position_sd(second, &made.views[1])];
+    let known = [position_sd(first, &made.views[0]), position_sd(second, &made.views[1])];
+    let sd = known.map(|known| known.map(|(sd, _)| sd));
     let mut files = vec![
         text_file(format!("{stem}.json"), undistortion::write_pair(&made, names, &maps, sd)),
         text_file(format!("{stem}-opencv.yaml"), undistortion::opencv_pair(&made)),
     ];
-    let views = made.views.iter().zip(calibrated_with).zip(sd);
-    for ((name, ((view, calibrated_with), sd)), map) in names.iter().zip(views).zip(&maps) {
+    let views = made.views.iter().zip(calibrated_with).zip(known);
+    for ((name, ((view, calibrated_with), known)), map) in names.iter().zip(views).zip(&maps) {
+        say!("{name}: {}", describe(view.view(), map));
+        if let Some(known) = known {
+            say!("{name}: {}", describe_sd(known));
+        }
         let file =
             CameraFile { camera: view.view().clone(), calibrated_with, failed: failed.clone() };
         files.extend(args.view.files(&format!("{name}-rectified"), &file, map)?);
-        say!("{name}: {}", describe(view.view(), map));
-        if let Some(sd) = sd {
-            say!("{name}: {}", describe_sd(sd));
-        }
     }
     let baseline = made.baseline_mm;
     let (mm, what) = match baseline.y == 0.0 {

@@ -7,6 +7,7 @@ use anyhow::{Context, ensure};
 
 use super::solving::ModelChoice;
 use crate::deltille::files::written::{File, sample_of, text_file};
+use crate::output::log;
 use deltille::calibrate::{Calibration, CameraTiming, Candidate, Model, Timing};
 use deltille::detect::Detection;
 use deltille::export::timing as timing_file;
@@ -22,7 +23,30 @@ pub fn times_ns(detections: &[(String, Detection)]) -> anyhow::Result<Times> {
         !times.is_empty() || detections.is_empty(),
         "no time stamps; give a video, a recording, or their detections"
     );
+    if times.len() < detections.len() {
+        let without = detections.len() - times.len();
+        log!(
+            "note: {without} of {} detections have no time stamp and are not used",
+            detections.len()
+        );
+    }
     Ok(times)
+}
+
+/// Residuals are suspicious beyond this number of standard deviations of corners: blur and paths that are not smooth explain a
+/// few.
+const MISFIT: f64 = 10.0;
+
+/// Warns of residuals that the timing does not explain.
+pub fn warn_of_misfit(found: &Timing) {
+    if found.rms_px > MISFIT * found.corner_sd_px && found.corner_sd_px > 0.0 {
+        log!(
+            "warning: residuals of the timing ({:.3} px) are many times the standard deviation of the corners ({:.3} px): check the \
+             camera, the target, and whether the time stamps are those of the exposures",
+            found.rms_px,
+            found.corner_sd_px
+        );
+    }
 }
 
 /// Recordings of all frames, whose views are compensated for the timing of the cameras.
@@ -82,6 +106,7 @@ pub fn prepare(
     if !others.is_empty() {
         (*calibration, timing) = compensated(&all)?;
     }
+    warn_of_misfit(&timing);
     Ok(Prepared { tried, timing: Some(timing) })
 }
 

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 
+use crate::deltille::files::written::same_file;
 use crate::output::{self, Overwrite, log};
 use deltille::calibrate::{Estimate, JointCovariance};
 use deltille::export::covariance::CovarianceFormat;
@@ -21,12 +22,12 @@ pub struct CovarianceArgs {
 const OPTION: &str = "--covariance";
 
 impl CovarianceArgs {
-    /// Rejects a file that cannot be written, before the work starts; `own` are the other files of the command.
-    pub fn check(&self, overwrite: Overwrite, own: &[PathBuf]) -> anyhow::Result<()> {
+    /// Rejects a file that cannot be written, before the work starts; `own` are the other files that the command reads or writes.
+    pub fn check(&self, overwrite: Overwrite, own: &[&Path]) -> anyhow::Result<()> {
         let Some(path) = &self.covariance else { return Ok(()) };
         let format = format_of(path)?;
         ensure!(
-            !own.contains(path),
+            !own.iter().any(|other| *other == path || same_file(other, path)),
             "{OPTION}: {} is another file of this command; use another name",
             path.display()
         );

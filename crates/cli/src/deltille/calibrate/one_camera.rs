@@ -92,7 +92,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let planned: Vec<File> = planned.collect();
     check_places(folder, &planned, args.overwrite)?;
     let page = args.solve.page(&stem, args.overwrite)?;
-    args.solve.covariance.check(args.overwrite, &[path.with_extension("json")])?;
+    let own = path.with_extension("json");
+    let own: Vec<&Path> =
+        args.sightings.target_files().iter().chain([&own]).map(PathBuf::as_path).collect();
+    args.solve.covariance.check(args.overwrite, &own)?;
     let measure = args.solve.measures_target();
     let Sightings { calibration, views, printed, empty, left_out, print, detections, unnamed } =
         args.sightings.read(&intrinsics, measure, args.solve.estimate_timing)?;

@@ -113,7 +113,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         checked.with_context(|| format!("camera {name}"))?;
     }
     args.check_files(&names, &cameras, &printed)?;
-    args.solve.covariance.check(args.overwrite, &[args.output.join("rig.json")])?;
+    let own = args.output.join("rig.json");
+    let own: Vec<&Path> = args.target.iter().chain([&own]).map(PathBuf::as_path).collect();
+    args.solve.covariance.check(args.overwrite, &own)?;
     let page = args.solve.page("rig", args.overwrite)?;
     let mut calibration = Calibration::of(&reference, panels).refine_panels(args.refine_target);
     let (mut left_out, mut ink, mut seen) = (Vec::new(), Vec::new(), Vec::new());

@@ -149,6 +149,11 @@ impl GridArgs {
 }
 
 impl SightingsArgs {
+    /// The files of the targets.
+    pub fn target_files(&self) -> &[PathBuf] {
+        &self.target
+    }
+
     /// Whether the given target overrides the one named in detections and cameras.
     pub fn assumes_target(&self) -> bool {
         self.assume_target
