@@ -132,42 +132,10 @@ fn by_place(camera_from_rig: &Pose) -> SMatrix<f64, 3, 6> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimate::on_rig::simulated::{changed, rig, set_covariance};
     use crate::estimate::values::CameraEstimate;
-    use crate::matrix::Matrix;
-    use crate::uncertainty::projection::ObservedCovariance;
     use deltille_core::camera::{BrownConrady, Camera, Lens};
     use glam::DQuat;
-
-    /// Three cameras side by side; the poses of the second and third are unknown.
-    fn rig() -> Estimate {
-        let lens =
-            Lens::BrownConrady(BrownConrady { radial: [-0.1, 0.02, 0.0], ..Default::default() });
-        let camera = |index: usize| {
-            let camera = Camera::centred(1280, 960, 1000.0 + 20.0 * index as f64, lens.clone());
-            let mut of = CameraEstimate::given(&index.to_string(), camera);
-            of.parameters.iter_mut().take(4).for_each(|parameter| parameter.sd = Some(1.0));
-            of.camera_from_rig = Pose {
-                rotation: DQuat::from_scaled_axis(DVec3::new(0.01, -0.08, 0.02) * index as f64),
-                translation: DVec3::new(-120.0, 4.0, 7.0) * index as f64,
-            };
-            of.pose_sd = (index > 0).then_some([1.0; 6]);
-            of.coverage = Coverage::new(8, 6, vec![1; 48]);
-            of
-        };
-        let cameras: Vec<CameraEstimate> = (0..3).map(camera).collect();
-        let mut rig = Estimate { cameras, ..Estimate::default() };
-        set_covariance(&mut rig, |_, _| 0.0);
-        rig
-    }
-
-    /// Sets the observed covariance of the unknowns of a rig.
-    fn set_covariance(rig: &mut Estimate, of: impl Fn(usize, usize) -> f64) {
-        let unknowns =
-            |of: &CameraEstimate| of.free().len() + 6 * usize::from(of.pose_sd.is_some());
-        let all = rig.cameras.iter().map(unknowns).sum();
-        let covariance = Matrix::from_fn(all, all, of);
-        rig.joint = Some(ObservedCovariance { covariance, of_board: None, freedom: 10.0 });
-    }
 
     /// The distance from the first of two cameras of the point that projects to two pixels with the least squares.
     fn triangulated(pair: [&CameraEstimate; 2], pixels: [DVec2; 2], start: DVec3) -> f64 {
@@ -194,7 +162,7 @@ mod tests {
     #[test]
     fn derivatives_equal_finite_differences() {
         for [first, second] in [[0, 1], [1, 2]] {
-            let rig = rig();
+            let rig = rig(3);
             let (all, observed) = rig.cameras_on_rig().unwrap();
             let pixel = DVec2::new(700.0, 300.0);
             let pair = [&all[first], &all[second]];
@@ -210,21 +178,7 @@ mod tests {
                 let start = all[index].column;
                 for unknown in 0..all[index].unknowns() {
                     let distance = |by: f64| {
-                        let mut changed = rig.clone();
-                        let camera = &mut changed.cameras[index];
-                        if unknown < 4 {
-                            let mut values = camera.camera.parameters();
-                            values[unknown] += by;
-                            camera.camera = camera.camera.with_parameters(&values);
-                        } else {
-                            let mut change = [0.0; 6];
-                            change[unknown - 4] = by;
-                            let pose = &mut camera.camera_from_rig;
-                            pose.rotation =
-                                DQuat::from_scaled_axis(DVec3::from_slice(&change[..3]))
-                                    * pose.rotation;
-                            pose.translation += DVec3::from_slice(&change[3..]);
-                        }
+                        let changed = changed(&rig, index, unknown, by);
                         triangulated(
                             [&changed.cameras[first], &changed.cameras[second]],
                             pixels,
@@ -247,8 +201,7 @@ mod tests {
     /// For parallel cameras the distance d along the axis has the error d² ε / (f b) for a disparity that is off by ε px.
     #[test]
     fn noise_is_that_of_a_disparity() {
-        let mut rig = rig();
-        rig.cameras.truncate(2);
+        let mut rig = rig(2);
         let pinhole =
             Camera::centred(1280, 960, 1000.0, Lens::BrownConrady(BrownConrady::default()));
         for camera in &mut rig.cameras {

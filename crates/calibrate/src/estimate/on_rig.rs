@@ -66,3 +66,76 @@ impl CameraOnRig<'_> {
         Some(Sight { projection, by_point: SMatrix::from_fn(|i, j| rows[i][j]), by_camera })
     }
 }
+
+/// Rigs for the tests of what depends on cameras.
+#[cfg(test)]
+pub(super) mod simulated {
+    use super::*;
+    use crate::estimate::coverage::Coverage;
+    use crate::matrix::Matrix;
+    use deltille_core::camera::{BrownConrady, Camera, Lens, Pose};
+    use glam::DQuat;
+
+    /// Cameras side by side, which see the target everywhere. Four parameters of each are unknown, and the poses of all but the first.
+    pub(in crate::estimate) fn rig(count: usize) -> Estimate {
+        let lens =
+            Lens::BrownConrady(BrownConrady { radial: [-0.1, 0.02, 0.0], ..Default::default() });
+        let camera = |index: usize| {
+            let camera = Camera::centred(1280, 960, 1000.0 + 20.0 * index as f64, lens.clone());
+            let mut of = CameraEstimate::given(&index.to_string(), camera);
+            of.parameters.iter_mut().take(4).for_each(|parameter| parameter.sd = Some(1.0));
+            of.camera_from_rig = Pose {
+                rotation: DQuat::from_scaled_axis(DVec3::new(0.01, -0.08, 0.02) * index as f64),
+                translation: DVec3::new(-120.0, 4.0, 7.0) * index as f64,
+            };
+            of.pose_sd = (index > 0).then_some([1.0; 6]);
+            of.coverage = Coverage::new(8, 6, vec![1; 48]);
+            of
+        };
+        let cameras: Vec<CameraEstimate> = (0..count).map(camera).collect();
+        let mut rig = Estimate { cameras, ..Estimate::default() };
+        set_covariance(&mut rig, |_, _| 0.0);
+        rig
+    }
+
+    /// Sets the observed covariance of the unknowns of a rig.
+    pub(in crate::estimate) fn set_covariance(
+        rig: &mut Estimate,
+        of: impl Fn(usize, usize) -> f64,
+    ) {
+        let unknowns = 10 * rig.cameras.len() - 6;
+        let covariance = Matrix::from_fn(unknowns, unknowns, of);
+        let observed = ObservedCovariance { covariance, of_board: None, freedom: 10.0 };
+        if let [only] = rig.cameras.as_mut_slice() {
+            let alignment = Matrix::from_fn(6, unknowns, |_, _| 0.0);
+            only.projection =
+                Some(crate::ProjectionUncertainty::new(alignment, Vec::new(), Some(observed)));
+        } else {
+            rig.joint = Some(observed);
+        }
+    }
+
+    /// The rig with a change of an unknown of a camera.
+    pub(in crate::estimate) fn changed(
+        rig: &Estimate,
+        camera: usize,
+        unknown: usize,
+        by: f64,
+    ) -> Estimate {
+        let mut rig = rig.clone();
+        let camera = &mut rig.cameras[camera];
+        if unknown < 4 {
+            let mut values = camera.camera.parameters();
+            values[unknown] += by;
+            camera.camera = camera.camera.with_parameters(&values);
+        } else {
+            let mut change = [0.0; 6];
+            change[unknown - 4] = by;
+            let pose = &mut camera.camera_from_rig;
+            let turn = DQuat::from_scaled_axis(DVec3::from_slice(&change[..3]));
+            pose.rotation = turn * pose.rotation;
+            pose.translation += DVec3::from_slice(&change[3..]);
+        }
+        rig
+    }
+}

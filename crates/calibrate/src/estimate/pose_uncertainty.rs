@@ -238,38 +238,12 @@ impl Sum {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::values::CameraEstimate;
-    use crate::matrix::Matrix;
-    use crate::uncertainty::projection::ObservedCovariance;
-    use deltille_core::camera::{BrownConrady, Camera, Lens};
+    use crate::estimate::on_rig::simulated::{changed, rig, set_covariance};
     use deltille_core::targets::BoardSpec;
     use glam::DVec2;
 
     fn board() -> Target {
         Target::new("board", BoardSpec::deltille(8, 10, 20.0)).unwrap()
-    }
-
-    /// Two cameras side by side that see the board; the observed covariance is that of their unknowns.
-    fn rig(count: usize, covariance: impl Fn(usize, usize) -> f64) -> Estimate {
-        let lens =
-            |k| Lens::BrownConrady(BrownConrady { radial: [k, 0.02, 0.0], ..Default::default() });
-        let camera = |index: usize| {
-            let camera = Camera::centred(1280, 960, 1000.0 + 20.0 * index as f64, lens(-0.1));
-            let mut of = CameraEstimate::given(&index.to_string(), camera);
-            of.parameters.iter_mut().take(4).for_each(|parameter| parameter.sd = Some(1.0));
-            of.camera_from_rig = Pose {
-                rotation: DQuat::from_scaled_axis(DVec3::new(0.01, -0.08, 0.02) * index as f64),
-                translation: DVec3::new(-120.0, 4.0, 7.0) * index as f64,
-            };
-            of.pose_sd = (index > 0).then_some([1.0; 6]);
-            of.coverage = Coverage::new(8, 6, vec![1; 48]);
-            of
-        };
-        let unknowns = if count == 1 { 4 } else { 14 };
-        let covariance = Matrix::from_fn(unknowns, unknowns, covariance);
-        let observed = ObservedCovariance { covariance, of_board: None, freedom: 10.0 };
-        let cameras = (0..count).map(camera).collect();
-        Estimate { cameras, joint: Some(observed), ..Estimate::default() }
     }
 
     /// The pose with the least squares for pixels of two cameras, from a start close to it.
@@ -306,7 +280,7 @@ mod tests {
 
     #[test]
     fn derivatives_equal_finite_differences() {
-        let (rig, body) = (rig(2, |_, _| 0.0), Body::of(&board()).unwrap());
+        let (rig, body) = (rig(2), Body::of(&board()).unwrap());
         let (cameras, _) = rig.cameras_on_rig().unwrap();
         let pose = body.facing(DVec3::new(30.0, -20.0, 600.0), TILT, 1.0);
         let found = Seen::of(&cameras, 0, &body, &pose).unwrap();
@@ -317,22 +291,9 @@ mod tests {
         for unknown in 0..14 {
             let step = if (8..11).contains(&unknown) { 1e-5 } else { 1e-2 };
             let [more, less] = [step, -step].map(|by| {
-                let mut changed = rig.clone();
-                let (index, own) =
+                let (camera, own) =
                     (usize::from(unknown >= 4), unknown - if unknown < 4 { 0 } else { 4 });
-                let camera = &mut changed.cameras[index];
-                if own < 4 {
-                    let mut values = camera.camera.parameters();
-                    values[own] += by;
-                    camera.camera = camera.camera.with_parameters(&values);
-                } else {
-                    let mut change = [0.0; 6];
-                    change[own - 4] = by;
-                    let of = &mut camera.camera_from_rig;
-                    of.rotation =
-                        DQuat::from_scaled_axis(DVec3::from_slice(&change[..3])) * of.rotation;
-                    of.translation += DVec3::from_slice(&change[3..]);
-                }
+                let changed = changed(&rig, camera, own, by);
                 solved_pose(&changed, &body, &pixels, pose)
             });
             let turn = (more.rotation * less.rotation.conjugate()).to_scaled_axis();
@@ -353,12 +314,9 @@ mod tests {
     /// A focal length that is 1 % longer makes distances 1 % longer, where perspective is weak.
     #[test]
     fn a_focal_length_acts_on_the_distance() {
-        let rig = rig(1, |i, j| if i < 2 && j < 2 { 10_000.0 } else { 0.0 });
-        let mut only = rig.clone();
+        let mut only = rig(1);
+        set_covariance(&mut only, |i, j| if i < 2 && j < 2 { 10_000.0 } else { 0.0 });
         only.cameras[0].camera.focal_px = DVec2::splat(10_000.0);
-        let alignment = Matrix::from_fn(6, 4, |_, _| 0.0);
-        only.cameras[0].projection =
-            Some(crate::ProjectionUncertainty::new(alignment, vec![600.0], rig.joint));
         let of = |mm: f64| only.pose_uncertainty(0, &board(), mm).unwrap();
         let [near, far] = [of(5000.0), of(10_000.0)];
         assert!((far.calibration.along_mm / 100.0 - 1.0).abs() < 0.03, "{far:?}");
