@@ -85,8 +85,7 @@ impl Estimate {
             let sight = (rig_from_camera.rotation * centre).normalize_or_zero();
             let by_calibration = &seen.by_cameras * covariance * seen.by_cameras.transpose();
             sums[0].add(&by_calibration, sight, corners);
-            let noise = seen.noise;
-            sums[1].add(&DMatrix::from_fn(6, 6, |i, j| noise[(i, j)]), sight, corners);
+            sums[1].add(&seen.noise, sight, corners);
         }
         let [calibration, per_px] = sums.map(|sum| sum.rms());
         Some(PoseUncertainty {
@@ -149,7 +148,7 @@ struct Seen {
     /// Its derivatives with respect to the unknowns of all cameras.
     by_cameras: DMatrix<f64>,
     /// Its covariance for pixels with noise of 1 px.
-    noise: Matrix6<f64>,
+    noise: DMatrix<f64>,
 }
 
 impl Seen {
@@ -189,9 +188,8 @@ impl Seen {
         if visible < LEAST_CORNERS {
             return None;
         }
-        let by_cameras = -solved(&normal, &across)?;
         let noise = solved(&normal, &DMatrix::identity(6, 6))?;
-        Some(Self { by_cameras, noise: Matrix6::from_fn(|i, j| noise[(i, j)]) })
+        Some(Self { by_cameras: -solved(&normal, &across)?, noise })
     }
 }
 
