@@ -90,7 +90,7 @@ pub use estimate::joint_covariance::{JointCovariance, JointUnknown};
 pub use estimate::lens_limit::LensLimit;
 pub use estimate::pose_uncertainty::{PoseSd, PoseUncertainty};
 pub use estimate::target_map::{CornerOffset, MIN_VIEWS_TO_MEASURE, TargetMap};
-pub use estimate::uncertainty_map::UncertaintyMap;
+pub use estimate::uncertainty_map::{UncertaintyMap, ViewUncertainty};
 pub use estimate::values::{
     CameraEstimate, Corner, Estimate, FrameEstimate, Parameter, TargetEstimate, ViewEstimate,
 };

@@ -68,7 +68,7 @@ impl Calibration {
 
     /// Every third view with the map and the cameras of the others; `None` if these do not suffice for a calibration.
     fn cross_validated(&self) -> Option<Box<Estimate>> {
-        self.clone().hold_out(Some(HELD_OUT)).solved().ok()?.held_out
+        self.clone().hold_out(Some(HELD_OUT)).covariance_of_all(false).solved().ok()?.held_out
     }
 
     /// The same calibration with everything fixed to the estimate except the poses of the target.
@@ -102,6 +102,7 @@ impl Calibration {
             board_shape: false,
             measure_target: false,
             distances_mm: Vec::new(),
+            covariance_of_all: false,
             order: self.order.clone(),
             delays: Some(estimate.cameras.iter().map(|camera| camera.delay).collect()),
             symmetries: self.symmetries.clone(),

@@ -365,8 +365,8 @@ impl Rig {
     /// -------
     /// tuple of two floats, or None
     ///     Standard deviation from the calibration, mm; and from noise of the pixels, mm for each px of noise per
-    ///     coordinate: RMS values over points that both cameras see, where the first one detected corners. ``None`` if not known, or if there are no such
-    ///     points.
+    ///     coordinate: RMS values over points that both cameras see, where the first one detected corners. ``None`` if not
+    ///     known, or if there are no such points.
     fn depth_sd(
         &self,
         first: &str,

@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use deltille::calibrate::{
     Calibration, CalibrationError, Candidate, Constraint, ConstraintError, Diagnosis, Estimate,
-    Excluded, Intrinsics, Loss, Messages, Model, PanelPrior, Reference, UntaggedGrid, View,
-    Weights, views,
+    Excluded, Intrinsics, Loss, Messages, Model, PanelPrior, PoseUncertainty, Reference,
+    UntaggedGrid, View, Weights, views,
 };
 use deltille::export::calibration::{Print, Residuals};
 use deltille::export::sheet::Sheet;
@@ -295,6 +295,8 @@ pub struct Solved {
     /// The models compared, by camera.
     pub models: Vec<Vec<Candidate>>,
     pub targets: Vec<Printing>,
+    /// Uncertainties of poses of the targets; empty if it was read from a file, which lists them.
+    pub poses: Vec<PoseUncertainty>,
     pub model: String,
     /// Whether it is a rig, which may have a single camera.
     pub is_rig: bool,
@@ -315,6 +317,7 @@ impl Solved {
             stated: Vec::new(),
             models,
             targets,
+            poses: Vec::new(),
             model,
             is_rig: file.as_ref().is_some_and(|(_, whole)| whole.get("cameras").is_some()),
             file,
@@ -345,12 +348,10 @@ impl Solved {
         if let Some((text, _)) = &self.file {
             return text.clone();
         }
-        let Self { estimate, diagnoses, print, .. } = self;
-        let targets: Vec<_> = self.targets.iter().map(|one| one.target.clone()).collect();
-        let poses = estimate.pose_uncertainties(&targets);
+        let Self { estimate, diagnoses, print, poses, .. } = self;
         match self.is_rig {
-            true => rig::write(estimate, diagnoses, &self.model, *print, residuals, &poses),
-            false => calibration::write(estimate, diagnoses, *print, residuals, &poses)
+            true => rig::write(estimate, diagnoses, &self.model, *print, residuals, poses),
+            false => calibration::write(estimate, diagnoses, *print, residuals, poses)
                 .unwrap_or_default(),
         }
     }
@@ -506,6 +507,19 @@ pub fn solve(
             grid.target("board").and_then(Result::ok).map(Printing::from).into_iter().collect()
         }
     };
+    let described: Vec<_> = targets.iter().map(|one| one.target.clone()).collect();
+    let poses = estimate.pose_uncertainties(&described);
     let model = model.name();
-    Ok(Solved { estimate, diagnoses, print, stated, models, targets, model, is_rig, file: None })
+    Ok(Solved {
+        estimate,
+        diagnoses,
+        print,
+        stated,
+        models,
+        targets,
+        poses,
+        model,
+        is_rig,
+        file: None,
+    })
 }

@@ -1,12 +1,14 @@
 //! Estimates when the rows of calibrated cameras are exposed.
 
+use std::collections::BTreeMap;
+
 use deltille::calibrate::{self, Measured, Reference, TimedCamera, views};
 use deltille::export::timing;
 use pyo3::prelude::*;
 
 use super::checking::{before, check_target, given};
 use super::solving::{Seen, assume};
-use crate::boundary::errors::{self, Raise, raised, unlocked};
+use crate::boundary::errors::{self, Raise, raised, unlocked, warn};
 use crate::see::detection::Targets;
 
 /// When the rows of each camera are exposed.
@@ -164,31 +166,26 @@ pub fn timing_of(
         }
         let times =
             detections.iter().filter_map(|(name, found)| Some((name.clone(), found.time_ns?)));
-        let times: std::collections::BTreeMap<String, i64> = times.collect();
+        let times: BTreeMap<String, i64> = times.collect();
         if times.is_empty() && !detections.is_empty() {
             return Err(wrong(
                 "the detections have no time stamps: detect the frames of a recording".to_owned(),
             ));
         }
+        if times.len() < detections.len() {
+            let (without, all) = (detections.len() - times.len(), detections.len());
+            warn(
+                py,
+                &format!("{without} of {all} detections have no time stamp and are not used"),
+            )?;
+        }
         let mut shown = views(&detections, &reference).raise(errors::calibration)?.views;
         shown.retain(|view| reference.labels_are_of_board(view));
-        let size = [of.camera.width, of.camera.height];
-        if let Some(other) = shown.iter().find(|view| view.size_px != size) {
-            let ([width, height], [own_width, own_height]) = (other.size_px, size);
-            let what = format!(
-                "{}: {width} × {height} px, but the camera has {own_width} × {own_height}",
-                other.name
-            );
-            return Err(wrong(what));
-        }
-        let stamped = shown.into_iter().filter_map(|view| Some((*times.get(&view.name)?, view)));
-        cameras.push(TimedCamera {
-            name: of.name.clone(),
-            camera: of.camera.clone(),
-            camera_from_rig: of.camera_from_rig,
-            views: stamped.collect(),
-        });
+        let camera = TimedCamera::of(of, shown, &times);
+        cameras.push(camera.map_err(|error| wrong(error.to_string()))?);
     }
     let found = unlocked(py, move || calibrate::timing(&cameras, &panels))?;
-    found.map(Timing).map_err(|error| wrong(error.to_string()))
+    let found = found.map_err(|error| wrong(error.to_string()))?;
+    found.misfit().iter().try_for_each(|said| warn(py, said))?;
+    Ok(Timing(found))
 }

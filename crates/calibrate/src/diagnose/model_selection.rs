@@ -73,13 +73,15 @@ const EXCLUDED_VIEWS: usize = 2;
 impl Calibration {
     /// This calibration of one camera with other views.
     pub(crate) fn of_views(&self, views: Vec<View>) -> Self {
-        self.of_cameras(vec![CameraViews { views, ..self.cameras[0].clone() }])
+        let camera = CameraViews { views, ..self.cameras[0].clone() };
+        self.of_cameras(vec![camera]).covariance_of_all(false)
     }
 
     /// This calibration of one camera with other intrinsics.
     fn of_intrinsics(&self, intrinsics: impl Into<Intrinsics>) -> Self {
         let intrinsics = intrinsics.into();
-        self.of_cameras(vec![CameraViews { intrinsics, ..self.cameras[0].clone() }])
+        let camera = CameraViews { intrinsics, ..self.cameras[0].clone() };
+        self.of_cameras(vec![camera]).covariance_of_all(false)
     }
 
     /// A sample of the views of a calibration of one camera, on which alternatives are tested, and

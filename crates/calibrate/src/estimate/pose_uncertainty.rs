@@ -72,6 +72,7 @@ impl Estimate {
         let of = cameras.get(camera)?;
         let body = Body::of(target)?;
         let mut sums = [Sum::default(), Sum::default()];
+        let rig_from_camera = of.estimate.camera_from_rig.inverse();
         let positions = Coverage::of(of.estimate).blocks(of.estimate.size_px());
         for (index, (pixel, corners)) in positions.into_iter().enumerate() {
             let Some(centre) = seen_at(&of.estimate.camera, pixel, Some(distance_mm)) else {
@@ -79,7 +80,6 @@ impl Estimate {
             };
             // Successive positions are tilted about different axes.
             let pose = body.facing(centre, TILT, FRAC_PI_4 * (index % 8) as f64);
-            let rig_from_camera = of.estimate.camera_from_rig.inverse();
             let seen = Seen::of(&cameras, camera, &body, &rig_from_camera.after(&pose));
             let Some(seen) = seen else { continue };
             let sight = (rig_from_camera.rotation * centre).normalize_or_zero();

@@ -25,6 +25,18 @@ pub struct UncertaintyMap {
     pub sd_px: Vec<Option<f64>>,
 }
 
+/// The uncertainty of positions in an undistorted view that is due to the estimated camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ViewUncertainty {
+    /// Standard deviation of a position, px: RMS per axis where corners were detected.
+    pub position_sd_px: f64,
+    /// Fraction of the view in which corners were detected. Elsewhere the lens is extrapolated.
+    pub calibrated_fraction: f64,
+    /// The source of the standard deviation.
+    pub source: Source,
+}
+
 /// Number of positions along the longer side of an image.
 const POSITIONS: usize = 24;
 
@@ -119,9 +131,17 @@ impl CameraEstimate {
         found.is_finite().then(|| found.to_cols_array_2d())
     }
 
-    /// Standard deviation of positions in an undistorted view, px: the RMS per axis where corners were detected; and the fraction of the
-    /// view in which they were. Elsewhere the lens is extrapolated. `None` if it is not known.
-    pub fn undistorted_sd_px(&self, view: &Undistortion, source: Source) -> Option<[f64; 2]> {
+    /// The uncertainty of positions in an undistorted view, observed if that is known, otherwise from noise; `None` if neither is.
+    pub fn view_uncertainty(&self, view: &Undistortion) -> Option<ViewUncertainty> {
+        let from = |source| self.view_uncertainty_from(view, source);
+        from(Source::Observed).or_else(|| from(Source::Noise))
+    }
+
+    fn view_uncertainty_from(
+        &self,
+        view: &Undistortion,
+        source: Source,
+    ) -> Option<ViewUncertainty> {
         let size = DVec2::new(f64::from(view.view().width), f64::from(view.view().height));
         let steps = (size * POSITIONS as f64 / size.max_element()).round().max(DVec2::ONE);
         let coverage = Coverage::of(self);
@@ -138,7 +158,11 @@ impl CameraEstimate {
                 }
             }
         }
-        (seen > 0.0).then(|| [(sum / seen).sqrt(), seen / all])
+        (seen > 0.0).then(|| ViewUncertainty {
+            position_sd_px: (sum / seen).sqrt(),
+            calibrated_fraction: seen / all,
+            source,
+        })
     }
 
     /// Standard deviation of a projection per axis, px: the RMS over the detected corners. `None` if it is not known.

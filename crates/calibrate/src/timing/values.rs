@@ -1,5 +1,8 @@
 //! Views with time stamps, and the timing of cameras as values.
 
+use std::collections::BTreeMap;
+
+use crate::estimate::values::CameraEstimate;
 use crate::input::observation::View;
 use deltille_core::camera::{Camera, Pose};
 
@@ -14,6 +17,30 @@ pub struct TimedCamera {
     pub camera_from_rig: Pose,
     /// Time stamps, ns, and views, in any order.
     pub views: Vec<(i64, View)>,
+}
+
+impl TimedCamera {
+    /// A calibrated camera with those of its views that have a time stamp, ns, by name.
+    ///
+    /// # Errors
+    /// Returns an error if an image has another size than those of the calibration.
+    pub fn of(
+        camera: &CameraEstimate,
+        views: Vec<View>,
+        times_ns: &BTreeMap<String, i64>,
+    ) -> Result<Self, TimingError> {
+        let camera_px = [camera.camera.width, camera.camera.height];
+        if let Some(other) = views.iter().find(|view| view.size_px != camera_px) {
+            return Err(TimingError::OtherSize { size_px: other.size_px, camera_px });
+        }
+        let stamped = views.into_iter().filter_map(|view| Some((*times_ns.get(&view.name)?, view)));
+        Ok(Self {
+            name: camera.name.clone(),
+            camera: camera.camera.clone(),
+            camera_from_rig: camera.camera_from_rig,
+            views: stamped.collect(),
+        })
+    }
 }
 
 /// The timing of the cameras of a rig, or of one camera.
@@ -32,6 +59,23 @@ pub struct Timing {
     pub rms_px: f64,
     /// Median standard deviation of a detected corner per axis, px; zero if it is not known.
     pub corner_sd_px: f64,
+}
+
+/// Residuals are suspicious beyond this number of standard deviations of corners: blur and paths that are not smooth explain a
+/// few.
+const MISFIT: f64 = 10.0;
+
+impl Timing {
+    /// A sentence about residuals that the timing does not explain, without initial capital and full stop; `None` if it explains them.
+    pub fn misfit(&self) -> Option<String> {
+        let Self { rms_px, corner_sd_px, .. } = *self;
+        (rms_px > MISFIT * corner_sd_px && corner_sd_px > 0.0).then(|| {
+            format!(
+                "residuals of the timing ({rms_px:.3} px) are many times the standard deviation of the corners ({corner_sd_px:.3} px): \
+                 check the camera, the target, and whether the time stamps are those of the exposures"
+            )
+        })
+    }
 }
 
 /// The timing of one camera.
@@ -95,6 +139,17 @@ pub enum TimingError {
         frames: usize,
         /// The minimum.
         needed: usize,
+    },
+    /// Images have another size than those of the calibration.
+    #[error(
+        "the images have {} × {} px, the camera {} × {} px",
+        size_px[0], size_px[1], camera_px[0], camera_px[1]
+    )]
+    OtherSize {
+        /// Width and height of an image, px.
+        size_px: [u32; 2],
+        /// Width and height of the images of the calibration, px.
+        camera_px: [u32; 2],
     },
     /// The images do not fit any timing.
     #[error(

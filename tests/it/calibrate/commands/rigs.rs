@@ -63,6 +63,9 @@ fn a_pair_with_an_upside_down_camera_is_rectified_upright() {
     assert_eq!(named, [1, 1], "{poses}");
     let several = "--camera: rig.json: this file contains 2 cameras; use `deltille rectify`";
     refused(at, "undistort --camera rig.json", &[several]);
+    let one = "calibrate first --target board.json --force";
+    refused(at, &format!("{one} -o board.yaml"), &["board.json is read by this command"]);
+    refused(at, &format!("{one} --covariance board.json"), &["board.json is another file"]);
     // Their diagonals are 1 without a rotation.
     let upright: Vec<f64> = [0, 4, 8]
         .map(|place| pair["views"][0]["view_from_camera"][place].as_f64().unwrap())

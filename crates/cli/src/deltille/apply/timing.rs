@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, ensure};
 
 use crate::deltille::calibrate::rig_cameras::{
     CamerasArgs, Source, follow, named, topic, topic_of_one,
@@ -12,7 +12,7 @@ use crate::deltille::calibrate::{compensation, sightings};
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::{camera_file, target_file};
 use crate::interrupt;
-use crate::output::{self, Overwrite};
+use crate::output::{self, Overwrite, log};
 use deltille::calibrate::{Estimate, Reference, TimedCamera, timing};
 use deltille::export::kind::Kind;
 use deltille::export::timing as timing_file;
@@ -78,28 +78,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             compensation::times_ns(&read.detections).with_context(|| source.option.clone())?;
         let mut views = read.views;
         sightings::take_known(&mut views, &reference);
-        let size = [of.camera.width, of.camera.height];
-        if let Some(other) = views.iter().find(|view| view.size_px != size) {
-            let [width, height] = other.size_px;
-            bail!(
-                "{}: the images have {width} × {height} px, the camera {} × {} px",
-                source.option,
-                size[0],
-                size[1]
-            );
-        }
-        let stamped = views.into_iter().filter_map(|view| Some((*times.get(&view.name)?, view)));
-        let views = stamped.collect();
-        let (name, camera, camera_from_rig) =
-            (of.name.clone(), of.camera.clone(), of.camera_from_rig);
-        cameras.push(TimedCamera { name, camera, camera_from_rig, views });
+        let camera = TimedCamera::of(of, views, &times);
+        cameras.push(camera.with_context(|| source.option.clone())?);
     }
     let panels: Vec<_> = reference.panels().iter().map(|of| of.target_from_panel).collect();
     let found = timing(&cameras, &panels)?;
     if let Some(path) = &path {
         output::write(path, timing_file::write(&found).as_bytes(), args.overwrite)?;
     }
-    compensation::warn_of_misfit(&found);
+    found.misfit().iter().for_each(|said| log!("warning: {said}"));
     output::print(&compensation::describe(&found))?;
     if let Some(path) = &path {
         output::print(&format!("wrote {}\n", shown(&path.display().to_string())))?;

@@ -19,7 +19,7 @@ use crate::output::{self, Overwrite, say};
 use crate::run::{self, BAD_INPUT, FAILED, Interrupted};
 use crate::values::distance;
 use crate::{interrupt, progress};
-use deltille::calibrate::{CameraEstimate, Estimate, Source};
+use deltille::calibrate::{Estimate, Source, ViewUncertainty};
 use deltille::camera::{Camera, CameraFile, Field, PixelMap, Rectification, Undistortion};
 use deltille::export::camera::{opencv, ros};
 use deltille::export::kind::{Kind, signed_png};
@@ -183,36 +183,27 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let map = args.view.map(&made);
     let view = CameraFile { camera: made.view().clone(), calibrated_with, failed };
     let mut files = args.view.files(&stem, &view, &map)?;
-    let known = position_sd(known, &made);
-    let sd = known.map(|(sd, _)| sd);
-    files.insert(0, text_file(format!("{stem}.json"), undistortion::write(&made, &map, sd)));
+    let known = known.view_uncertainty(&made);
+    files.insert(0, text_file(format!("{stem}.json"), undistortion::write(&made, &map, known)));
     let staged = Staged::new(&args.view.output, &files, args.view.overwrite)?;
     say!("{}", describe(made.view(), &map));
-    if let Some(known) = known {
-        say!("{}", describe_sd(known));
+    if let Some(known) = &known {
+        say!("{}", describe_uncertainty(known));
     }
     let made = pictures.write(&images, &map)?;
     made.end(staged)
 }
 
-/// The standard deviation of positions in a view that is due to the calibration of its camera, the calibrated fraction of the view, and
-/// the source of the uncertainty.
-type Known = ([f64; 2], Source);
-
-fn position_sd(camera: &CameraEstimate, view: &Undistortion) -> Option<Known> {
-    let from = |source| Some((camera.undistorted_sd_px(view, source)?, source));
-    from(Source::Observed).or_else(|| from(Source::Noise))
-}
-
-/// Describes it.
-fn describe_sd(([sd, fraction], source): Known) -> String {
-    let from = match source {
+/// Describes the uncertainty of positions in a view.
+fn describe_uncertainty(known: &ViewUncertainty) -> String {
+    let from = match known.source {
         Source::Noise => "from noise alone",
         Source::Observed => "observed",
     };
     format!(
-        "positions are known to {sd:.4} px (1σ, RMS per axis, {from}) where the calibration saw corners, in {:.0} % of the view",
-        100.0 * fraction
+        "positions are known to {:.4} px (1σ, RMS per axis, {from}) where the calibration saw corners, in {:.0} % of the view",
+        known.position_sd_px,
+        100.0 * known.calibrated_fraction
     )
 }
 
@@ -401,17 +392,16 @@ pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
     let sample = [text_file(format!("{stem}.json"), sample_of(undistortion::PAIR_SCHEMA))];
     check_places(&args.view.output, &sample, args.view.overwrite)?;
     let maps = [&made.views[0], &made.views[1]].map(|view| args.view.map(view));
-    let known = [position_sd(first, &made.views[0]), position_sd(second, &made.views[1])];
-    let sd = known.map(|known| known.map(|(sd, _)| sd));
+    let known = [first.view_uncertainty(&made.views[0]), second.view_uncertainty(&made.views[1])];
     let mut files = vec![
-        text_file(format!("{stem}.json"), undistortion::write_pair(&made, names, &maps, sd)),
+        text_file(format!("{stem}.json"), undistortion::write_pair(&made, names, &maps, known)),
         text_file(format!("{stem}-opencv.yaml"), undistortion::opencv_pair(&made)),
     ];
     let views = made.views.iter().zip(calibrated_with).zip(known);
     for ((name, ((view, calibrated_with), known)), map) in names.iter().zip(views).zip(&maps) {
         say!("{name}: {}", describe(view.view(), map));
         if let Some(known) = known {
-            say!("{name}: {}", describe_sd(known));
+            say!("{name}: {}", describe_uncertainty(&known));
         }
         let file =
             CameraFile { camera: view.view().clone(), calibrated_with, failed: failed.clone() };

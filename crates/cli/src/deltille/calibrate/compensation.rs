@@ -33,22 +33,6 @@ pub fn times_ns(detections: &[(String, Detection)]) -> anyhow::Result<Times> {
     Ok(times)
 }
 
-/// Residuals are suspicious beyond this number of standard deviations of corners: blur and paths that are not smooth explain a
-/// few.
-const MISFIT: f64 = 10.0;
-
-/// Warns of residuals that the timing does not explain.
-pub fn warn_of_misfit(found: &Timing) {
-    if found.rms_px > MISFIT * found.corner_sd_px && found.corner_sd_px > 0.0 {
-        log!(
-            "warning: residuals of the timing ({:.3} px) are many times the standard deviation of the corners ({:.3} px): check the \
-             camera, the target, and whether the time stamps are those of the exposures",
-            found.rms_px,
-            found.corner_sd_px
-        );
-    }
-}
-
 /// Recordings of all frames, whose views are compensated for the timing of the cameras.
 pub struct AllFrames {
     /// By camera.
@@ -106,7 +90,7 @@ pub fn prepare(
     if !others.is_empty() {
         (*calibration, timing) = compensated(&all)?;
     }
-    warn_of_misfit(&timing);
+    timing.misfit().iter().for_each(|said| log!("warning: {said}"));
     Ok(Prepared { tried, timing: Some(timing) })
 }
 

@@ -15,7 +15,7 @@ use super::solving::{
 };
 use crate::deltille::files::camera_file;
 use crate::deltille::files::written::{
-    File, check_places, same_file, sample_of, text_file, write_all,
+    File, check_places, keep_inputs, same_file, sample_of, text_file, write_all,
 };
 use crate::interrupt;
 use crate::output::{self, Overwrite, log};
@@ -91,6 +91,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let planned = planned.into_iter().chain(args.solve.planned(&stem)).chain(timing);
     let planned: Vec<File> = planned.collect();
     check_places(folder, &planned, args.overwrite)?;
+    keep_inputs(folder, &planned, args.sightings.target_files())?;
     let page = args.solve.page(&stem, args.overwrite)?;
     let own = path.with_extension("json");
     let own: Vec<&Path> =

@@ -18,7 +18,7 @@ use super::solving::{
 };
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::written::{
-    File, check_places, same_file, sample_of, text_file, write_all,
+    File, check_places, keep_inputs, same_file, sample_of, text_file, write_all,
 };
 use crate::deltille::files::{camera_file, target_file};
 use crate::interrupt;
@@ -296,7 +296,8 @@ impl Args {
         let json = sample_of(rig::SCHEMA);
         let (mut files, _) = self.files(&cameras.collect::<Vec<_>>(), &json, &found, printed)?;
         files.extend(self.solve.estimate_timing.then(|| compensation::planned("rig")));
-        check_places(&self.output, &files, self.overwrite)
+        check_places(&self.output, &files, self.overwrite)?;
+        keep_inputs(&self.output, &files, &self.target)
     }
 
     /// Returns all files, and errors for the formats that failed; `json` is the complete result.

@@ -95,6 +95,15 @@ pub fn same_file(written: &Path, other: &Path) -> bool {
     written.is_some() && written == other
 }
 
+/// Rejects outputs in a folder that would replace a file that the command reads, even with `--force`.
+pub fn keep_inputs(folder: &Path, files: &[File], inputs: &[PathBuf]) -> anyhow::Result<()> {
+    let is_read = |path: &PathBuf| inputs.iter().any(|input| same_file(path, input));
+    match files.iter().map(|file| folder.join(&file.name)).find(is_read) {
+        Some(path) => bail!("-o: {} is read by this command; use another name", path.display()),
+        None => Ok(()),
+    }
+}
+
 /// Returns a placeholder JSON of a schema, for [`check_places`].
 pub fn sample_of(schema: &str) -> String {
     format!("{{\"schema\": \"{schema}\"}}")

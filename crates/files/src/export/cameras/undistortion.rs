@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::export::GENERATOR;
 use crate::export::detections::npy;
+use deltille_calibrate::ViewUncertainty;
 use deltille_core::camera::{PixelMap, Rectification, Undistortion};
 use deltille_core::json;
 
@@ -63,7 +64,7 @@ struct Named<'a> {
 }
 
 impl View {
-    fn of(made: &Undistortion, map: &PixelMap, known: Option<[f64; 2]>) -> Self {
+    fn of(made: &Undistortion, map: &PixelMap, known: Option<ViewUncertainty>) -> Self {
         let camera = made.view();
         let field =
             |side: u32| 2.0 * (f64::from(side) / 2.0 / camera.focal_px.x).atan().to_degrees();
@@ -77,8 +78,8 @@ impl View {
             view_from_camera: rows(made),
             valid_fraction: map.valid_fraction(),
             valid_px: map.valid_rectangle(),
-            position_sd_px: known.map(|[sd, _]| sd),
-            calibrated_fraction: known.map(|[_, fraction]| fraction),
+            position_sd_px: known.map(|of| of.position_sd_px),
+            calibrated_fraction: known.map(|of| of.calibrated_fraction),
         }
     }
 }
@@ -88,10 +89,9 @@ fn rows(made: &Undistortion) -> [f64; 9] {
     DMat3::from_quat(made.view_from_camera()).transpose().to_cols_array()
 }
 
-/// The JSON text of an undistorted view; `map` contains the position in the photograph of each pixel of the view, and
-/// `known` the result of
-/// [`CameraEstimate::undistorted_sd_px`](deltille_calibrate::CameraEstimate::undistorted_sd_px), if they are known.
-pub fn write(made: &Undistortion, map: &PixelMap, known: Option<[f64; 2]>) -> String {
+/// The JSON text of an undistorted view; `map` contains the position in the photograph of each pixel of the view, and `known` the
+/// uncertainty of positions in it.
+pub fn write(made: &Undistortion, map: &PixelMap, known: Option<ViewUncertainty>) -> String {
     json::to_text(&ViewFile { schema: SCHEMA, view: View::of(made, map, known) }, 1)
 }
 
@@ -100,7 +100,7 @@ pub fn write_pair(
     made: &Rectification,
     names: [&str; 2],
     maps: &[PixelMap; 2],
-    known: [Option<[f64; 2]>; 2],
+    known: [Option<ViewUncertainty>; 2],
 ) -> String {
     let views = names.into_iter().zip(&made.views).zip(maps).zip(known);
     let views =
