@@ -33,11 +33,15 @@ pub(super) fn cholesky(mut matrix: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
     Some(Cholesky::pack_dirty(matrix))
 }
 
-/// The inverse of a symmetric matrix from its factor L: the square of L⁻¹.
+/// The inverse of a symmetric matrix from its factor L.
 pub(super) fn inverse(factor: Cholesky<f64, Dyn>) -> DMatrix<f64> {
+    squared(&inverse_of_factor(factor))
+}
+
+/// The inverse of a lower triangular factor.
+pub(super) fn inverse_of_factor(factor: Cholesky<f64, Dyn>) -> DMatrix<f64> {
     let mut root = factor.unpack();
-    let n = root.nrows();
-    for (first, count) in blocks(n) {
+    for (first, count) in blocks(root.nrows()) {
         let (above, mut own) = root.rows_range_pair_mut(..first, first..first + count);
         let across = own.columns(0, first).into_owned();
         let own_lower = own.columns(first, count).into_owned();
@@ -45,15 +49,21 @@ pub(super) fn inverse(factor: Cholesky<f64, Dyn>) -> DMatrix<f64> {
         own.columns_mut(first, count).fill_with_identity();
         own_lower.solve_lower_triangular_mut(&mut own.columns_mut(0, first + count));
     }
-    let turned = root.transpose();
-    let mut inverse = DMatrix::zeros(n, n);
+    root
+}
+
+/// AᵀA of a lower triangular matrix A.
+pub(super) fn squared(lower: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = lower.nrows();
+    let turned = lower.transpose();
+    let mut square = DMatrix::zeros(n, n);
     for (first, count) in blocks(n) {
-        let mut own = inverse.view_mut((first, first), (n - first, count));
+        let mut own = square.view_mut((first, first), (n - first, count));
         let left = turned.view((first, first), (n - first, n - first));
-        own.gemm(1.0, &left, &root.view((first, first), (n - first, count)), 0.0);
+        own.gemm(1.0, &left, &lower.view((first, first), (n - first, count)), 0.0);
     }
-    inverse.fill_upper_triangle_with_lower_triangle();
-    inverse
+    square.fill_upper_triangle_with_lower_triangle();
+    square
 }
 
 /// Subtracts the product of two matrices, which must be symmetric, from the blocks on and below the

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix};
 use rayon::prelude::*;
 
-use super::cholesky::{cholesky, half_product, inverse};
+use super::cholesky::{cholesky, half_product, inverse, inverse_of_factor, squared};
 use super::layout::Layout;
 use super::normal::{Normal, PARTS_AT_A_TIME, Part, Reduced};
 use super::robot::by_shared;
@@ -58,6 +58,10 @@ fn fixed<const K: usize>(matrix: &DMatrix<f64>) -> SMatrix<f64, K, K> {
 /// Eigenvalue below which the reduced equations are singular, after scaling by the diagonal that they would have with
 /// known poses: elimination leaves errors of a few dozen times the machine precision.
 const SINGULAR: f64 = 1e-14;
+
+/// Trace of the inverse, relative to 1 / [`SINGULAR`], below which no eigenvalue is singular and rounding is of no
+/// importance.
+const CERTAIN: f64 = 0.01;
 
 /// Minimum component of an unknown that is involved in a direction, as a fraction of the largest
 /// component.
@@ -236,25 +240,47 @@ impl Normal {
         }
         let scale = DVector::from_fn(n, |i, _| 1.0 / self.a[(i, i)].max(f64::MIN_POSITIVE).sqrt());
         let scaled = DMatrix::from_fn(n, n, |i, j| reduced[(i, j)] * scale[i] * scale[j]);
-        let eigen = scaled.clone().symmetric_eigen();
-        let mut inverse = DMatrix::zeros(n, n);
-        let mut loose = BTreeSet::new();
-        for (&value, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-            if value <= SINGULAR {
-                let most = direction.amax();
-                loose.extend((0..n).filter(|&i| direction[i].abs() >= INVOLVED * most));
-            }
-            inverse += direction * direction.transpose() / value.max(SINGULAR);
-        }
+        let found = of_determined(&scaled).unwrap_or_else(|| of_undetermined(&scaled));
+        let (inverse, [half, inverse_half], loose) = found;
         let is_tied = |&i: &usize| inverse[(i, i)] * scaled[(i, i)] > TIED * TIED;
         let tied = (0..n).filter(is_tied).collect();
         let inverse = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
-        let roots = eigen.eigenvalues.map(|value| value.max(SINGULAR).sqrt());
-        let turn = &eigen.eigenvectors;
         let root = Root {
-            half: DMatrix::from_fn(n, n, |i, j| scale[i] * turn[(i, j)] / roots[j]),
-            inverse: DMatrix::from_fn(n, n, |i, j| roots[i] * turn[(j, i)] / scale[j]),
+            half: DMatrix::from_fn(n, n, |i, j| scale[i] * half[(i, j)]),
+            inverse: DMatrix::from_fn(n, n, |i, j| inverse_half[(i, j)] / scale[j]),
         };
-        Inverse { matrix: inverse, root, loose: loose.into_iter().collect(), tied }
+        Inverse { matrix: inverse, root, loose, tied }
     }
+}
+
+/// The inverse of a matrix, a square root of the inverse and the inverse of this root, and the undetermined columns.
+type Inverted = (DMatrix<f64>, [DMatrix<f64>; 2], Vec<usize>);
+
+/// The inverse by Cholesky's method; `None` if the matrix could be singular.
+fn of_determined(scaled: &DMatrix<f64>) -> Option<Inverted> {
+    let factor = cholesky(scaled.clone())?;
+    let upper = factor.l().transpose();
+    let lower = inverse_of_factor(factor);
+    let inverse = squared(&lower);
+    // The smallest eigenvalue is at least the reciprocal of the trace of the inverse.
+    (inverse.trace() < CERTAIN / SINGULAR)
+        .then(|| (inverse, [lower.transpose(), upper], Vec::new()))
+}
+
+/// The inverse by eigenvalues; those less than [`SINGULAR`] are raised to it.
+fn of_undetermined(scaled: &DMatrix<f64>) -> Inverted {
+    let n = scaled.nrows();
+    let eigen = scaled.clone().symmetric_eigen();
+    let mut loose = BTreeSet::new();
+    for (&value, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+        if value <= SINGULAR {
+            let most = direction.amax();
+            loose.extend((0..n).filter(|&i| direction[i].abs() >= INVOLVED * most));
+        }
+    }
+    let roots = eigen.eigenvalues.map(|value| value.max(SINGULAR).sqrt());
+    let turn = &eigen.eigenvectors;
+    let half = DMatrix::from_fn(n, n, |i, j| turn[(i, j)] / roots[j]);
+    let inverse_half = DMatrix::from_fn(n, n, |i, j| roots[i] * turn[(j, i)]);
+    (&half * half.transpose(), [half, inverse_half], loose.into_iter().collect())
 }
