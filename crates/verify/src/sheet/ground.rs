@@ -34,6 +34,12 @@ pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<
             }
             // Only at this distance from edges.
             let is_off = |most: f64, near_px: f64| {
+                // Black is right wherever it may be expected; this handles most of an inverted panel.
+                if 1.0 - ink <= most
+                    && grounds.iter().any(|ground| ground.has_field_at(page, pixel))
+                {
+                    return false;
+                }
                 let expected = |ground: &Ground| ground.expected(page, pixel, near_px);
                 let expected = grounds.iter().find_map(expected).unwrap_or(Some(0.0));
                 expected.is_some_and(|expected| (ink - expected).abs() > most)
@@ -104,6 +110,19 @@ impl<'a> Ground<'a> {
         }
     }
 
+    /// Whether a pixel is in the black field of an inverted panel.
+    fn has_field_at(&self, page: &Page, pixel: DVec2) -> bool {
+        self.inverted()
+            && self.is_around(pixel)
+            && self.inside_mm(self.placed.panel_from_page(page.page_from_px(pixel))) >= 0.0
+    }
+
+    /// Returns how far a position on the panel lies within the outline of the field, mm.
+    fn inside_mm(&self, place: DVec2) -> f64 {
+        let depths = self.field.iter().map(|[from, inwards]| (place - from).dot(*inwards));
+        depths.fold(f64::INFINITY, f64::min)
+    }
+
     /// Returns the expected ink of a pixel in the panel's area. Returns `Some(None)` in and beside the tiles, which
     /// are compared separately, and within `near_px` of the edge of the field. Another panel may lie between the
     /// tiles of a panel that is not inverted.
@@ -112,8 +131,7 @@ impl<'a> Ground<'a> {
             return None;
         }
         let place = self.placed.panel_from_page(page.page_from_px(pixel));
-        let depths = self.field.iter().map(|[from, inwards]| (place - from).dot(*inwards));
-        let inside = depths.fold(f64::INFINITY, f64::min) * page.px_per_mm;
+        let inside = self.inside_mm(place) * page.px_per_mm;
         if inside < -near_px {
             return None;
         }
