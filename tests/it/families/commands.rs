@@ -47,7 +47,7 @@ fn a_search_by_work_depends_on_its_seed_alone() {
         let mut command = deltag();
         command.args([
             "gen-family",
-            "d16h6",
+            "d9h3",
             "--from-scratch",
             "--work",
             "1",
