@@ -117,7 +117,7 @@ impl Calibration {
             change_px = change(&before, &now);
             let corner_px = if timing.corner_sd_px > 0.0 { timing.corner_sd_px } else { PLAIN_PX };
             if change_px < SETTLED * corner_px {
-                return Ok((found, timing));
+                return Ok((Self { is_compensated: true, ..found }, timing));
             }
             before = now;
             let estimate = found.clone().hold_out(None).solve()?;

@@ -184,10 +184,7 @@ impl Diagnosis {
             Self::UnusableFit { camera, .. }
             | Self::PoorFit { camera, .. }
             | Self::LackOfFit(LackOfFit::Lens { camera, .. }) => Some(camera),
-            Self::Remedied {
-                camera,
-                remedy: Remedy { alternative: Alternative::Model(_), .. },
-            } => Some(camera),
+            Self::Remedied { camera, remedy } if remedy.alternative.is_of_lens() => Some(camera),
             _ => None,
         }
     }
@@ -468,13 +465,12 @@ fn causes(found: &Estimate, alone: &[Alone], states: &mut Vec<Diagnosis>) -> Vec
     if remedies.iter().any(of(Alternative::Camera)) {
         remedies.retain(of(Alternative::Camera));
     }
-    let is_of_model =
-        |(_, remedy): &&(usize, Remedy)| matches!(remedy.alternative, Alternative::Model(_));
+    let is_of_lens = |(_, remedy): &&(usize, Remedy)| remedy.alternative.is_of_lens();
     states.retain(|state| {
         let is_worse = |of: &(usize, Remedy)| {
             state.of_state().is_some_and(|(camera, px)| camera == of.0 && px > of.1.to_px)
         };
-        !remedies.iter().filter(is_of_model).any(is_worse)
+        !remedies.iter().filter(is_of_lens).any(is_worse)
     });
     remedies.retain(|remedy| !states.iter().any(|state| state.explains(remedy)));
     // Report the one board and the one target only once.

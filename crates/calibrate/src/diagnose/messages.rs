@@ -71,7 +71,8 @@ impl<'a> Messages<'a> {
             }
             Diagnosis::RollingShutter { camera, shutter } => {
                 let views = self.estimate.cameras.get(*camera).map_or(0, |of| of.views.len());
-                self.of_camera(*camera, rolling_shutter(shutter, views))
+                let is_compensated = self.estimate.is_compensated;
+                self.of_camera(*camera, rolling_shutter(shutter, views, is_compensated))
             }
             Diagnosis::StretchedBoard { stretch, .. } => stretched(stretch),
             Diagnosis::NonMonotonicLens { camera, end } => self.of_camera(*camera, end.to_string()),
@@ -264,6 +265,12 @@ impl<'a> Messages<'a> {
             Alternative::Camera => {
                 (GIVEN_CAMERA.to_owned(), "estimating the intrinsics".to_owned())
             }
+            Alternative::Constraints => {
+                let constraints = self.estimate.cameras.get(camera);
+                let constraints = constraints.and_then(|of| of.described_constraints());
+                let cause = format!("a constraint is wrong ({})", constraints.unwrap_or_default());
+                (cause, "estimating the parameters without constraints".to_owned())
+            }
             Alternative::Model(other) => (
                 match model {
                     Some(model) => {
@@ -452,13 +459,20 @@ fn changed(change: &CameraChange) -> String {
     )
 }
 
-fn rolling_shutter(shutter: &RollingShutter, all: usize) -> String {
+fn rolling_shutter(shutter: &RollingShutter, all: usize, is_compensated: bool) -> String {
     let RollingShutter { shear_px, views, significance, left_px } = shutter;
+    let cause = match is_compensated {
+        true => "after compensation for the readout: the target does not move smoothly between frames; move it without jerks, \
+                 or record more frames per second"
+            .to_owned(),
+        false => format!(
+            "because the board or the camera moved during readout; keep both still for each image, use a camera with a global \
+             shutter, or calibrate from all frames of a recording with {CalibrationCompensatedForTiming}"
+        ),
+    };
     format!(
         "rolling shutter: rows are displaced by {shear_px:.1} px between the first and the last, in {views} of {all} \
-         views ({}; modelling it leaves {left_px:.3} px RMS), because the board or the camera moved during readout; \
-         keep both still for each image, use a camera with a global shutter, or calibrate from all frames of a recording with \
-         {CalibrationCompensatedForTiming}",
+         views ({}; modelling it leaves {left_px:.3} px RMS), {cause}",
         p_value(*significance)
     )
 }

@@ -61,6 +61,15 @@ pub enum Alternative {
     Panels,
     /// The intrinsics of the camera, which had been given.
     Camera,
+    /// The parameters of the camera without its constraints.
+    Constraints,
+}
+
+impl Alternative {
+    /// Whether it changes what the calibration assumes about the lens.
+    pub(super) fn is_of_lens(self) -> bool {
+        matches!(self, Self::Model(_) | Self::Constraints)
+    }
 }
 
 /// The separate calibration of one camera, and its estimate.
@@ -75,6 +84,13 @@ impl Calibration {
     pub(crate) fn of_views(&self, views: Vec<View>) -> Self {
         let camera = CameraViews { views, ..self.cameras[0].clone() };
         self.of_cameras(vec![camera]).covariance_of_all(false)
+    }
+
+    /// This calibration of one camera without constraints; `None` if it has none.
+    fn unconstrained(&self) -> Option<Self> {
+        let camera = CameraViews { constraints: Vec::new(), ..self.cameras[0].clone() };
+        let is_constrained = !self.cameras[0].constraints.is_empty();
+        is_constrained.then(|| self.of_cameras(vec![camera]).covariance_of_all(false))
     }
 
     /// This calibration of one camera with other intrinsics.
@@ -153,9 +169,11 @@ impl Calibration {
         let bends = self.panels.len() == 1 && !self.board_shape && !is_absurd(&found.cameras[0]);
         let shape =
             bends.then(|| (Alternative::Shape, trial.clone().board_shape(true).adjusted().ok()));
+        let free =
+            trial.unconstrained().map(|trial| (Alternative::Constraints, trial.adjusted().ok()));
         let shows_several = trial.cameras[0].views.iter().any(|view| view.sightings.len() > 1);
         let places = shows_several.then(|| (Alternative::Panels, trial.with_panels_found()));
-        let tried = shape.into_iter().chain(models).chain(places);
+        let tried = free.into_iter().chain(shape).chain(models).chain(places);
         let tried = tried.filter_map(|(alternative, other)| Some((alternative, other?)));
         let from_px = found.inlier_rms_px();
         // The sample may exclude views that the whole calibration includes.
@@ -256,8 +274,9 @@ fn lens_first(
     of_residuals: Option<Remedy>,
     of_excluded: impl FnOnce() -> Option<Remedy>,
 ) -> Option<Remedy> {
-    let is_of_lens =
-        |remedy: &Remedy| matches!(remedy.alternative, Alternative::Model(_) | Alternative::Camera);
+    let is_of_lens = |remedy: &Remedy| {
+        remedy.alternative.is_of_lens() || remedy.alternative == Alternative::Camera
+    };
     of_residuals.filter(is_of_lens).or_else(of_excluded).or(of_residuals)
 }
 
@@ -289,7 +308,7 @@ fn gain(found: &Estimate, other: &Estimate, alternative: Alternative) -> Option<
     };
     let of_panels = match alternative {
         Alternative::Panels => 6.0 * (panel_count(other) - 1.0),
-        Alternative::Model(_) | Alternative::Shape | Alternative::Camera => 0.0,
+        _ => 0.0,
     };
     let unknowns = |estimate: &Estimate| estimate.unknown_count() as f64;
     let frames = |estimate: &Estimate| estimate.frames.len();

@@ -126,6 +126,7 @@ impl Estimate {
             sigma: variance.sqrt(),
             lack_of_fit: lack_of_fit(problem, whitening),
             steps: *steps,
+            is_compensated: calibration.is_compensated,
             known: known_so_far(settled, &found, variance),
             states,
             cameras,

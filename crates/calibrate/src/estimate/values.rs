@@ -79,6 +79,9 @@ pub struct Estimate {
     pub(crate) known: Option<KnownSoFar>,
     /// The state equations of the views of each camera.
     pub(crate) states: Vec<Option<StateEquations>>,
+    /// Whether the corners were compensated for the timing of the cameras, see
+    /// [`Calibration::compensated_for_timing`](crate::Calibration::compensated_for_timing).
+    pub is_compensated: bool,
 }
 
 /// The estimate of one camera.

@@ -58,6 +58,8 @@ pub struct Calibration {
     pub(crate) hold_out: Option<usize>,
     pub(crate) distances_mm: Vec<f64>,
     pub(crate) covariance_of_all: bool,
+    /// Whether the corners are compensated for the timing of their cameras.
+    pub(crate) is_compensated: bool,
     /// Index of the initial lens of the model to use; `None` to use the best one.
     pub(crate) start: Option<usize>,
     /// Names of all frames in order, if this calibration contains only some of them.
@@ -146,6 +148,7 @@ impl Calibration {
             hold_out: None,
             distances_mm: Vec::new(),
             covariance_of_all: false,
+            is_compensated: false,
             start: None,
             order: Vec::new(),
             delays: None,
@@ -264,10 +267,16 @@ impl Calibration {
     }
 
     /// Sets the distances, mm, at which the projection uncertainty is reported in addition to infinity; the default is
-    /// the distance of the corners.
+    /// the distance of the corners. A repeated distance counts once.
     #[must_use]
     pub fn distances_mm(self, distances_mm: Vec<f64>) -> Self {
-        Self { distances_mm, ..self }
+        let mut once = Vec::new();
+        for mm in distances_mm {
+            if !once.contains(&mm) {
+                once.push(mm);
+            }
+        }
+        Self { distances_mm: once, ..self }
     }
 
     /// Sets whether [`Estimate::covariance`](crate::Estimate) contains the poses of frames and the offsets of measured corners, up to

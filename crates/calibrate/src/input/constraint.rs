@@ -275,7 +275,8 @@ mod tests {
 
     use super::*;
     use crate::{
-        Calibration, CameraEstimate, CameraViews, Model, Observation, PanelRef, Sighting, View,
+        Calibration, CameraEstimate, CameraViews, Messages, Model, Observation, PanelRef, Sighting,
+        View,
     };
     use deltille_core::camera::{BrownConrady, Pose};
     use glam::{DVec2, DVec3};
@@ -391,6 +392,34 @@ mod tests {
         assert!((value(&tight, "k3").1.unwrap() / 1e-7 - 1.0).abs() < 0.01);
         same(&fixed, &tight, 0.01);
         same(&free, &found(&[Constraint::prior("k3=5±1e6").unwrap()]), 0.01);
+    }
+
+    /// A wrong constraint is not taken for another lens.
+    #[test]
+    fn a_wrong_constraint_is_named() {
+        let views = views(&mut ChaCha8Rng::seed_from_u64(5));
+        let of = |constraints: &[&str]| {
+            let camera = CameraViews::new("c", views.clone(), Model::Radtan5);
+            let constraints = constraints.iter().map(|of| Constraint::fixed(of).unwrap());
+            let camera = CameraViews { constraints: constraints.collect(), ..camera };
+            let calibration =
+                Calibration::new([Pose::IDENTITY]).board_accuracy_mm(Some(0.0)).with(camera);
+            let found = calibration.solve().unwrap();
+            let said = calibration.explain(&found);
+            said.iter().map(|of| Messages::new(&found, None).sentence(of)).collect::<Vec<_>>()
+        };
+        for wrong in [&["k1=-0.1", "k2=0.04", "k3=0"][..], &["fx=1060"], &["cx=560"]] {
+            let said = of(wrong);
+            assert!(
+                said.iter().any(|of| of.contains("a constraint is wrong")),
+                "{wrong:?}: {said:?}"
+            );
+            assert!(
+                said.iter().all(|of| !of.contains("does not fit the lens")),
+                "{wrong:?}: {said:?}"
+            );
+        }
+        assert!(of(&["k1=-0.15"]).iter().all(|of| !of.contains("constraint")));
     }
 
     /// Over many calibrations with a new measurement each, errors agree with the standard deviations, both those from

@@ -508,6 +508,7 @@ pub(in crate::export) fn diagnoses<'a>(
                     Alternative::Shape => "board_shape".to_owned(),
                     Alternative::Panels => "panels".to_owned(),
                     Alternative::Camera => "camera".to_owned(),
+                    Alternative::Constraints => "constraints".to_owned(),
                     _ => return None,
                 }),
                 ..text
