@@ -1,7 +1,7 @@
 //! Measures known lengths with calibrated cameras, against a limit.
 
 use deltille::calibrate::{self, AcceptanceRequest, CornerLabel, KnownLength, Limit, Temperature};
-use deltille::export::acceptance;
+use deltille::export::acceptance::{self, Tested};
 use deltille::report::Certificate;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -29,7 +29,7 @@ impl Acceptance {
     /// Number of images of one camera, or of sets of simultaneous images of a rig.
     #[getter]
     fn frames(&self) -> usize {
-        self.found.frames
+        self.found.measured.len()
     }
 
     /// Known lengths at the temperature of the target, mm.
@@ -76,7 +76,7 @@ impl Acceptance {
 
     /// Returns the text that ``deltille accept -o`` writes, with the uncertainty budget of each length.
     fn to_json(&self) -> String {
-        acceptance::write(&self.found)
+        acceptance::write(&self.found, None)
     }
 
     /// Returns the certificate as HTML, which prints on one page of A4.
@@ -87,9 +87,12 @@ impl Acceptance {
     ///     Names of the calibration and of the target on the certificate.
     fn certificate(&self, calibration: &str, target: &str) -> String {
         let certificate = Certificate {
-            calibration: calibration.to_owned(),
-            target: target.to_owned(),
-            lengths: self.has_table.then(|| "a table".to_owned()),
+            tested: Tested {
+                calibration: calibration.to_owned(),
+                calibration_sha256: None,
+                target: target.to_owned(),
+                lengths: self.has_table.then(|| "a table".to_owned()),
+            },
             found: &self.found,
         };
         certificate.html()

@@ -1,6 +1,6 @@
 //! The result of an acceptance test.
 
-use super::request::{AcceptanceRequest, CornerLabel};
+use super::request::{AcceptanceRequest, CornerLabel, KnownLength};
 use deltille_core::statistics::f_p_value;
 
 /// The result of an acceptance test.
@@ -17,12 +17,16 @@ pub struct Acceptance {
     pub lengths: Vec<LengthError>,
     /// Deviations of the measured corners from the target.
     pub probing: Probing,
-    /// Number of frames: images of one camera, or simultaneous images of a rig.
-    pub frames: usize,
+    /// Names of the measured frames: images of one camera, or simultaneous images of a rig.
+    pub measured: Vec<String>,
     /// Names of frames in which no length was measured, because too few corners were seen.
     pub unmeasured: Vec<String>,
     /// Names of views that were not measured, because their pose is that of a view of the calibration.
     pub reused: Vec<String>,
+    /// Number of corners of the measured frames, in each of their images.
+    pub observations: usize,
+    /// Number of these where the calibration saw no corners, so that the lens is extrapolated.
+    pub extrapolated: usize,
     /// Standard deviation of a corner of the target per axis that was assumed, mm; zero for an exact target.
     pub board_accuracy_mm: f64,
     /// The terms of the test.
@@ -128,6 +132,12 @@ impl Acceptance {
     /// Number of lengths with this judgement.
     pub fn count(&self, conformity: Conformity) -> usize {
         self.lengths.iter().filter(|of| self.conformity(of) == Some(conformity)).count()
+    }
+
+    /// The given lengths that no frame measured, because their ends were never seen together.
+    pub fn missing(&self) -> impl Iterator<Item = &KnownLength> {
+        let is_measured = |known: &KnownLength| self.lengths.iter().any(|of| of.ends == known.ends);
+        self.request.lengths.iter().filter(move |known| !is_measured(known))
     }
 
     /// Whether the lengths are on several panels.
@@ -236,16 +246,26 @@ mod tests {
         };
         let lengths = [0.02, -0.05, 0.09].map(of).to_vec();
         let limit = Some(Limit { constant_mm: 0.03, per_length: 2e-4 });
+        let elsewhere = CornerLabel { panel: crate::PanelRef::ONLY, row: 3, col: 0 };
+        let unseen = KnownLength { ends: [elsewhere; 2], length_mm: 60.0, sd_mm: 0.0 };
+        let seen = KnownLength { ends: lengths[0].ends, ..unseen };
         let found = Acceptance {
             is_triangulated: true,
             lengths,
             probing: Probing::default(),
-            frames: 1,
+            measured: vec![String::new()],
             unmeasured: Vec::new(),
             reused: Vec::new(),
+            observations: 0,
+            extrapolated: 0,
             board_accuracy_mm: 0.0,
-            request: AcceptanceRequest { limit, ..AcceptanceRequest::default() },
+            request: AcceptanceRequest {
+                lengths: vec![seen, unseen],
+                limit,
+                ..AcceptanceRequest::default()
+            },
         };
+        assert_eq!(found.missing().collect::<Vec<_>>(), [&unseen]);
         let each: Vec<_> = found.lengths.iter().map(|of| found.conformity(of).unwrap()).collect();
         assert_eq!(each, [Conformity::Conforms, Conformity::Undecided, Conformity::Fails]);
         assert_eq!(found.verdict(), Some(Conformity::Fails));

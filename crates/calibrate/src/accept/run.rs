@@ -11,6 +11,7 @@ use super::lines;
 use super::request::{AcceptanceRequest, CornerLabel};
 use super::sensitivity::{Measured, Point, Variances, variance};
 use super::triangulated::{Image, Triangulated};
+use crate::estimate::coverage::Coverage;
 use crate::estimate::on_rig::CameraOnRig;
 use crate::estimate::values::Estimate;
 use crate::input::calibration::Calibration;
@@ -155,14 +156,17 @@ impl Calibration {
             is_triangulated,
             lengths: Vec::new(),
             probing: Probing::default(),
-            frames: 0,
+            measured: Vec::new(),
             unmeasured: Vec::new(),
             reused,
+            observations: 0,
+            extrapolated: 0,
             board_accuracy_mm: test.target.accuracy_mm,
             request: request.clone(),
         };
         let sides = before.cameras.iter().map(|of| of.camera.width.max(of.camera.height));
         let side = f64::from(sides.max().unwrap_or(0));
+        let coverages: Vec<Coverage> = before.cameras.iter().map(Coverage::of).collect();
         let mut squares = 0.0;
         for (name, views) in &views {
             let measured: Option<Box<dyn Measured>> = match is_triangulated {
@@ -178,7 +182,15 @@ impl Calibration {
                 let frame = name.clone();
                 return Err(AcceptanceError::Fit { frame, rms_px, is_rig: is_triangulated });
             }
-            found.frames += 1;
+            found.measured.push(name.clone());
+            for (camera, view) in views {
+                for (_, seen) in observations(view) {
+                    let is_known = coverages[*camera]
+                        .has_corners(seen.pixel, before.cameras[*camera].size_px());
+                    found.observations += 1;
+                    found.extrapolated += usize::from(!is_known);
+                }
+            }
             found.lengths.extend(test.lengths(name, measured.as_ref()));
             squares += found.probing.add(name, measured.points(), is_triangulated);
         }

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use crate::export::acceptance::Tested;
 use crate::report::html::escaped;
 use crate::report::plots::length_errors;
 use deltille_calibrate::{Acceptance, Conformity, CornerLabel, LengthError, Temperature};
@@ -10,17 +11,13 @@ use deltille_core::words::{counted, places};
 const STYLE: &str = include_str!("certificate.css");
 
 /// Number of lengths in the table.
-const ROWS: usize = 6;
+const ROWS: usize = 5;
 
 /// The contents of a certificate.
 #[derive(Clone, Debug)]
 pub struct Certificate<'a> {
-    /// The file of the calibration.
-    pub calibration: String,
-    /// The target.
-    pub target: String,
-    /// The table of measured lengths; `None` if those of the target's description were measured.
-    pub lengths: Option<String>,
+    /// What was tested, and with what.
+    pub tested: Tested,
     /// The result.
     pub found: &'a Acceptance,
 }
@@ -35,7 +32,7 @@ impl Certificate<'_> {
              <title>Acceptance test – {title}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
              <h1>Acceptance test of length measurement</h1>\n",
             version = env!("CARGO_PKG_VERSION"),
-            title = escaped(&self.calibration),
+            title = escaped(&self.tested.calibration),
         );
         page += &self.head();
         page += &verdict(found);
@@ -48,12 +45,7 @@ impl Certificate<'_> {
         page += &probing(found);
         page += &self.method();
         page += "</section></div>";
-        let _ = write!(
-            page,
-            "<div class=\"sign\"><div>Date</div><div>Tested by</div></div>\n\
-             <p class=\"note\">deltille {}</p>\n</body>\n</html>\n",
-            env!("CARGO_PKG_VERSION")
-        );
+        page += "<div class=\"sign\"><div>Date</div><div>Tested by</div></div>\n</body>\n</html>\n";
         page
     }
 
@@ -61,18 +53,28 @@ impl Certificate<'_> {
     fn head(&self) -> String {
         let found = self.found;
         let frames = match found.is_triangulated {
-            true => counted(found.frames, "set") + " of simultaneous images",
-            false => counted(found.frames, "image"),
+            true => counted(found.measured.len(), "set") + " of simultaneous images",
+            false => counted(found.measured.len(), "image"),
         };
         let corners = counted(found.probing.corners, "measured corner");
-        let images = format!("{frames}, {corners}{}", out(found));
+        let images = format!("{frames} ({}), {corners}{}", names(&found.measured), out(found));
+        let tested = &self.tested;
         let mut rows = vec![
-            ("Calibration", self.calibration.clone()),
-            ("Target", format!("{}; corners ± {} mm (1σ)", self.target, found.board_accuracy_mm)),
+            ("Calibration", tested.calibration.clone()),
+            ("Target", format!("{}; corners ± {} mm (1σ)", tested.target, found.board_accuracy_mm)),
             ("Images", images),
         ];
-        let known = match &self.lengths {
-            Some(file) => format!("{}, known from {file}", counted(found.lengths.len(), "length")),
+        if let Some(fingerprint) = &tested.calibration_sha256 {
+            rows.insert(1, ("Its SHA-256", fingerprint.clone()));
+        }
+        let known = match &tested.lengths {
+            Some(file) => {
+                let missing = match found.missing().count() {
+                    0 => String::new(),
+                    count => format!("; {} of the table never seen", counted(count, "length")),
+                };
+                format!("{}, known from {file}{missing}", counted(found.lengths.len(), "length"))
+            }
             None => {
                 format!("{} between corners of the target", counted(found.lengths.len(), "length"))
             }
@@ -96,9 +98,9 @@ impl Certificate<'_> {
             };
             rows.push(("Limit of the error", format!("{} mm{per}", limit.constant_mm)));
         }
-        let rows = rows.into_iter().map(|(name, value)| {
-            format!("<tr><th>{name}</th><td class=\"long\">{}</td></tr>", escaped(&value))
-        });
+        let rows = rows
+            .into_iter()
+            .map(|(name, value)| format!("<tr><th>{name}</th><td>{}</td></tr>", escaped(&value)));
         format!("<table class=\"head\">{}</table>", rows.collect::<String>())
     }
 
@@ -114,7 +116,7 @@ impl Certificate<'_> {
              target: a common error of scale is not seen. The probing error is the largest distance of a corner from the target."
             }
         };
-        let lines = match self.lengths {
+        let lines = match self.tested.lengths {
             Some(_) => "",
             None => {
                 " In each image, up to seven lines in different directions are measured, with up to five lengths each, in the manner of \
@@ -123,7 +125,8 @@ impl Certificate<'_> {
         };
         format!(
             "<h2>Method</h2><p class=\"note\">{how}{lines} Uncertainties follow the GUM; conformity is judged by \
-             ISO 14253-1. Images with the pose of an image of the calibration are not measured.</p>"
+             ISO 14253-1. Images with the pose of an image of the calibration are not measured. Computed with deltille {}.</p>",
+            env!("CARGO_PKG_VERSION")
         )
     }
 }
@@ -135,7 +138,31 @@ fn out(found: &Acceptance) -> String {
         (found.unmeasured.len(), "with too few corners"),
     ];
     let all = all.into_iter().filter(|(count, _)| *count > 0);
-    all.map(|(count, why)| format!("; not measured: {count} {why}")).collect()
+    let out: String = all.map(|(count, why)| format!("; not measured: {count} {why}")).collect();
+    match found.extrapolated {
+        0 => out,
+        count => format!(
+            "; {count} of {} outside the calibrated part of the image{out}",
+            counted(found.observations, "observation")
+        ),
+    }
+}
+
+/// Length of the list of images, characters: about two lines of the page.
+const NAMES: usize = 120;
+
+/// The first images, as many as there is room for; the JSON has all.
+fn names(all: &[String]) -> String {
+    let mut text = String::new();
+    for (index, name) in all.iter().enumerate() {
+        if text.len() + name.len() > NAMES {
+            let _ = write!(text, " and {} more", all.len() - index);
+            break;
+        }
+        text += if index == 0 { "" } else { ", " };
+        text += name;
+    }
+    text
 }
 
 /// A number as it was given.
@@ -185,12 +212,8 @@ fn verdict(found: &Acceptance) -> String {
 /// The lengths that matter most.
 fn decisive(found: &Acceptance) -> String {
     let has_panels = found.has_panels();
-    let first = if found.request.limit.is_some() {
-        "Decisive lengths: image"
-    } else {
-        "Largest errors: image"
-    };
-    let place = if has_panels { "panel: row, column" } else { "row, column" };
+    let first = if found.request.limit.is_some() { "Decisive: image" } else { "Largest: image" };
+    let place = if has_panels { "panel: row, col" } else { "row, col" };
     let mut text = format!(
         "<table><tr><th>{first}</th><th>from – to ({place})</th><th class=\"number\">known mm</th>\
          <th class=\"number\">measured mm</th><th class=\"number\">error mm</th><th class=\"number\">U mm</th>"
@@ -204,7 +227,7 @@ fn decisive(found: &Acceptance) -> String {
         let limit = found.request.limit.map_or(String::new(), |limit| {
             let verdict = found.conformity(of).map_or("", |of| of.name());
             format!(
-                "<td class=\"number\">{}</td><td>{verdict}</td>",
+                "<td class=\"number\">{}</td><td class=\"word\">{verdict}</td>",
                 mm.text(limit.of(of.known_mm))
             )
         });

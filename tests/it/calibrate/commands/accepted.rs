@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::still_calibrated::{beside, views, write};
 use super::{CALIBRATE, board, camera, detections, done, folder, json, output, refused};
 use deltille::camera::Pose;
+use deltille::export::acceptance;
 
 #[test]
 fn a_camera_and_a_rig_are_accepted_by_their_errors_of_length() {
@@ -47,9 +48,17 @@ fn a_camera_and_a_rig_are_accepted_by_their_errors_of_length() {
             assert_eq!(result.status.code(), Some(code), "{text}");
             let found = json(&at.join(format!("{verdict}.json")));
             assert_eq!((&found["verdict"], &found["method"]), (&verdict.into(), &method.into()));
-            assert_eq!(found["frames"], 4);
+            assert_eq!(
+                (&found["frames"], found["measured"].as_array().unwrap().len()),
+                (&4.into(), 4)
+            );
+            let file = input.split(' ').next().unwrap();
+            let fingerprint = acceptance::fingerprint(&std::fs::read(at.join(file)).unwrap());
+            assert_eq!(found["calibration"], file);
+            assert_eq!(found["calibration_sha256"], fingerprint.as_str());
             let page = std::fs::read_to_string(at.join("a.html")).unwrap();
             assert!(page.contains("Uncertainty of the first of these"), "{page}");
+            assert!(page.contains(&fingerprint), "{page}");
         }
         // A limit within the uncertainty of the largest error, with all errors below it.
         let found = json(&at.join("conforms.json"));

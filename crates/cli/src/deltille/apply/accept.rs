@@ -13,7 +13,7 @@ use crate::run::{FAILED, UNDECIDED};
 use deltille::calibrate::{
     Acceptance, AcceptanceRequest, Conformity, CornerLabel, KnownLength, Limit, Temperature,
 };
-use deltille::export::acceptance;
+use deltille::export::acceptance::{self, Tested};
 use deltille::export::kind::Kind;
 use deltille::known_lengths;
 use deltille::limits::Limits;
@@ -75,18 +75,33 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             log!("note: not measured: {}, such as {first}: {why}", counted(names.len(), "image"));
         }
     }
+    if let Some(first) = found.missing().next() {
+        let [from, to] = first.ends.map(|end| corner(&found, &end));
+        let missing = counted(found.missing().count(), "length");
+        log!(
+            "warning: --lengths: {missing} not measured, such as from {from} to {to}: both ends were never seen together"
+        );
+    }
+    if found.extrapolated > 0 {
+        log!(
+            "note: {} of {} are outside the calibrated part of the image, where the lens is extrapolated",
+            found.extrapolated,
+            counted(found.observations, "corner")
+        );
+    }
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let tested = Tested {
+        calibration: name(args.views.camera()),
+        calibration_sha256: Some(acceptance::fingerprint(&known.limits.read(args.views.camera())?)),
+        target: known.printing.target.identity().to_string(),
+        lengths: args.lengths.as_deref().map(name),
+    };
     if let Some(path) = &path {
-        output::write(path, acceptance::write(&found).as_bytes(), args.overwrite)?;
+        let text = acceptance::write(&found, Some(&tested));
+        output::write(path, text.as_bytes(), args.overwrite)?;
     }
     if let Some(page) = &page {
-        let name =
-            |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let certificate = Certificate {
-            calibration: name(args.views.camera()),
-            target: known.printing.target.identity().to_string(),
-            lengths: args.lengths.as_deref().map(name),
-            found: &found,
-        };
+        let certificate = Certificate { tested, found: &found };
         output::write(page, certificate.html().as_bytes(), args.overwrite).context("--report")?;
     }
     output::print(&describe(&found))?;
@@ -168,6 +183,14 @@ fn measured(text: &str) -> Result<(f64, f64), String> {
     }
 }
 
+/// The label of a corner.
+fn corner(found: &Acceptance, label: &CornerLabel) -> String {
+    match found.has_panels() {
+        true => format!("{}, {} on panel {}", label.row, label.col, label.panel),
+        false => format!("{}, {}", label.row, label.col),
+    }
+}
+
 /// Describes the result, one statement per line.
 fn describe(found: &Acceptance) -> String {
     let by_weight = found.by_weight();
@@ -177,10 +200,7 @@ fn describe(found: &Acceptance) -> String {
         false => "0".to_owned(),
     };
     let d = places(first.budget.combined_mm().max(1e-6)).min(6);
-    let corner = |label: &CornerLabel| match found.has_panels() {
-        true => format!("{}, {} on panel {}", label.row, label.col, label.panel),
-        false => format!("{}, {}", label.row, label.col),
-    };
+    let corner = |label: &CornerLabel| corner(found, label);
     let all = found.lengths.len();
     let verdict = match found.verdict() {
         Some(Conformity::Conforms) => format!("conforms: all {all} lengths"),

@@ -1,8 +1,9 @@
 //! The result of `deltille accept` as JSON, schema `deltille/acceptance/1`.
 
 use serde::Serialize;
+use sha2::{Digest, Sha256};
 
-use deltille_calibrate::{Acceptance, Conformity, CornerLabel, LengthError, Limit};
+use deltille_calibrate::{Acceptance, Conformity, CornerLabel, KnownLength, LengthError, Limit};
 use deltille_core::json;
 
 /// Schema and version that this crate writes.
@@ -15,8 +16,12 @@ struct AcceptanceFile<'a> {
     verdict: Option<&'static str>,
     limit: Option<LimitRecord>,
     method: &'static str,
+    #[serde(flatten)]
+    tested: Option<&'a Tested>,
     confidence: f64,
     frames: usize,
+    observations: usize,
+    extrapolated: usize,
     board_accuracy_mm: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     temperature: Option<TemperatureRecord>,
@@ -26,8 +31,10 @@ struct AcceptanceFile<'a> {
     counts: Option<CountsRecord>,
     lengths_within_uncertainty: usize,
     probing: ProbingRecord<'a>,
+    measured: &'a [String],
     reused: &'a [String],
     unmeasured: &'a [String],
+    missing: Vec<MissingRecord>,
     lengths: Vec<LengthRecord<'a>>,
 }
 
@@ -75,6 +82,13 @@ struct CornerRecord {
 }
 
 #[derive(Serialize)]
+struct MissingRecord {
+    from: CornerRecord,
+    to: CornerRecord,
+    length_mm: f64,
+}
+
+#[derive(Serialize)]
 struct LengthRecord<'a> {
     frame: &'a str,
     from: CornerRecord,
@@ -96,8 +110,27 @@ struct LengthRecord<'a> {
     verdict: Option<&'static str>,
 }
 
-/// The JSON text of a result.
-pub fn write(found: &Acceptance) -> String {
+/// What was tested, and with what.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Tested {
+    /// The file of the calibration.
+    pub calibration: String,
+    /// The fingerprint of this file; `None` if there is no file.
+    pub calibration_sha256: Option<String>,
+    /// The target, with its fingerprint.
+    pub target: String,
+    /// The table of measured lengths; `None` if those of the target's description were measured.
+    #[serde(rename = "lengths_from")]
+    pub lengths: Option<String>,
+}
+
+/// The fingerprint of a file: SHA-256, in hexadecimal.
+pub fn fingerprint(file: &[u8]) -> String {
+    Sha256::digest(file).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The JSON text of a result, and of what was tested if it is known.
+pub fn write(found: &Acceptance, tested: Option<&Tested>) -> String {
     let probing = &found.probing;
     let file = AcceptanceFile {
         schema: SCHEMA,
@@ -108,7 +141,10 @@ pub fn write(found: &Acceptance) -> String {
             .map(|Limit { constant_mm, per_length }| LimitRecord { constant_mm, per_length }),
         method: if found.is_triangulated { "triangulation" } else { "plane" },
         confidence: Acceptance::CONFIDENCE,
-        frames: found.frames,
+        tested,
+        frames: found.measured.len(),
+        observations: found.observations,
+        extrapolated: found.extrapolated,
         board_accuracy_mm: found.board_accuracy_mm,
         temperature: found.request.temperature.map(|of| TemperatureRecord {
             celsius: of.celsius(),
@@ -132,8 +168,10 @@ pub fn write(found: &Acceptance) -> String {
             rms_mm: probing.rms_mm,
             corners: probing.corners,
         },
+        measured: &found.measured,
         reused: &found.reused,
         unmeasured: &found.unmeasured,
+        missing: found.missing().map(missing).collect(),
         lengths: found.lengths.iter().map(|of| length(found, of)).collect(),
     };
     json::to_text(&file, 2)
@@ -141,6 +179,11 @@ pub fn write(found: &Acceptance) -> String {
 
 fn corner(of: &CornerLabel) -> CornerRecord {
     CornerRecord { panel: of.panel.id(), row: of.row, col: of.col }
+}
+
+fn missing(of: &KnownLength) -> MissingRecord {
+    let [from, to] = of.ends.map(|end| corner(&end));
+    MissingRecord { from, to, length_mm: of.length_mm }
 }
 
 fn length<'a>(found: &Acceptance, of: &'a LengthError) -> LengthRecord<'a> {
@@ -163,5 +206,17 @@ fn length<'a>(found: &Acceptance, of: &'a LengthError) -> LengthRecord<'a> {
         expanded_mm: budget.expanded_mm(),
         limit_mm: found.request.limit.map(|limit| limit.of(of.known_mm)),
         verdict: found.conformity(of).map(|of| of.name()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The first example of FIPS 180-2.
+    #[test]
+    fn fingerprints_are_those_of_sha256() {
+        let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(fingerprint(b"abc"), expected);
     }
 }

@@ -6,7 +6,7 @@ use crate::report::plots::axes::Axes;
 use deltille_calibrate::Acceptance;
 
 /// Size of the frame, user units.
-const FRAME: DVec2 = DVec2::new(444.0, 140.0);
+const FRAME: DVec2 = DVec2::new(444.0, 106.0);
 
 /// Height of the legend, user units.
 const FOOT: f64 = 22.0;
