@@ -189,6 +189,7 @@ macro_rules! whole {
                 let title = title.unwrap_or(usual).to_owned();
                 let page = unlocked(py, move || {
                     let mut page = report::Report::new(&title, &solved.estimate);
+                    page.poses = &solved.poses;
                     (page.diagnoses, page.stated) = (&solved.diagnoses, &solved.stated);
                     (page.print, page.models) = (solved.print, &solved.models);
                     page.html()

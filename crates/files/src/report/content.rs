@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use crate::export::calibration::Print;
 use crate::report::pictures::sample::Sample;
-use deltille_calibrate::{CameraEstimate, Candidate, Diagnosis, Estimate, Messages, PanelPrior};
+use deltille_calibrate::{
+    CameraEstimate, Candidate, Diagnosis, Estimate, Messages, PanelPrior, PoseUncertainty,
+};
 
 /// The contents of the report of a calibration.
 #[derive(Clone, Debug)]
@@ -30,6 +32,8 @@ pub struct Report<'a> {
     ///
     /// [`Calibration::compare_models`]: deltille_calibrate::Calibration::compare_models
     pub models: &'a [Vec<Candidate>],
+    /// Uncertainties of poses of the targets; see [`Estimate::pose_uncertainties`].
+    pub poses: &'a [PoseUncertainty],
 }
 
 impl<'a> Report<'a> {
@@ -37,7 +41,8 @@ impl<'a> Report<'a> {
     pub fn new(title: &'a str, estimate: &'a Estimate) -> Self {
         let (diagnoses, stated, print) = (&[], &[], Print::default());
         let (thumbnails, samples, models) = (BTreeMap::new(), BTreeMap::new(), &[]);
-        Self { title, estimate, diagnoses, stated, print, thumbnails, samples, models }
+        let poses = &[];
+        Self { title, estimate, diagnoses, stated, print, thumbnails, samples, models, poses }
     }
 
     /// Whether there are several cameras.

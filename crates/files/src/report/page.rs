@@ -62,7 +62,8 @@ fn html(report: &Report) -> String {
             let cells = cells(&of_camera(report, index, camera));
             let _ = write!(page, "<h2 class=\"camera\">{}</h2>{cells}", escaped(&camera.name));
         }
-        page += &exactness::uncertainty(camera);
+        page +=
+            &exactness::uncertainty(camera, report.poses.iter().filter(|of| of.camera == index));
         page += &exactness::residuals(report.estimate, camera, survey);
         if !report.is_rig() {
             page += &rig::targets(report);

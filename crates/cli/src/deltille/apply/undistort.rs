@@ -215,7 +215,8 @@ fn describe(view: &Camera, map: &PixelMap) -> String {
         1.0 => "every pixel is covered".to_owned(),
         part => format!(
             "{:.1} % of pixels are covered; {width} × {height} px from ({x}, {y}) are fully covered",
-            100.0 * part
+            // Not rounded up to all.
+            (1000.0 * part).floor() / 10.0
         ),
     };
     format!(

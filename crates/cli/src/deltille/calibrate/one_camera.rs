@@ -153,7 +153,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     files.extend(solved.measured(&stem, printed.first()).into_iter().chain(timing));
     let mut written = write_all(folder, &files, args.overwrite)?;
     if let Some(page) = page {
-        solved.write_page(&page, &stem, &[args.images.as_deref()], args.overwrite)?;
+        solved.write_page(&page, &stem, &[args.images.as_deref()], &poses, args.overwrite)?;
         written.push(page);
     }
     written.extend(args.solve.covariance.write(

@@ -7,7 +7,7 @@ use anyhow::{Context, ensure};
 
 use super::solving::Calibrated;
 use crate::output::{self, Overwrite, log};
-use deltille::calibrate::{View, ViewEstimate};
+use deltille::calibrate::{PoseUncertainty, View, ViewEstimate};
 use deltille::photograph;
 use deltille::raster::{AnyGray, Gray};
 use deltille::report::{Report, Sample, shown_views, thumbnail};
@@ -24,6 +24,7 @@ impl Calibrated {
         page: &Path,
         title: &str,
         folders: &[Option<&Path>],
+        poses: &[PoseUncertainty],
         overwrite: Overwrite,
     ) -> anyhow::Result<()> {
         let (mut thumbnails, mut samples) = (BTreeMap::new(), BTreeMap::new());
@@ -52,7 +53,7 @@ impl Calibrated {
         let mut report = Report::new(title, estimate);
         (report.diagnoses, report.stated) = (diagnoses, stated);
         (report.print, report.thumbnails) = (*print, thumbnails);
-        (report.samples, report.models) = (samples, models);
+        (report.samples, report.models, report.poses) = (samples, models, poses);
         output::write(page, report.html().as_bytes(), overwrite).context("--report")
     }
 }

@@ -190,7 +190,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut written = write_all(&args.output, &files, args.overwrite)?;
     if let Some(page) = page {
         let folders: Vec<_> = names.iter().map(|name| of_name(&args.images, name)).collect();
-        solved.write_page(&page, "rig", &folders, args.overwrite)?;
+        solved.write_page(&page, "rig", &folders, &poses, args.overwrite)?;
         written.push(page);
     }
     written.extend(args.solve.covariance.write(

@@ -3,7 +3,7 @@
 use crate::report::html;
 use crate::report::measures::survey::Survey;
 use crate::report::plots::{board_residuals, field, residuals};
-use deltille_calibrate::{CameraEstimate, Estimate, Source};
+use deltille_calibrate::{CameraEstimate, Estimate, PoseSd, PoseUncertainty, Source};
 
 /// The section with residuals by image position, target corner, radius and view, and the coverage of the image.
 pub(in crate::report) fn residuals(
@@ -45,8 +45,11 @@ pub(in crate::report) fn residuals(
     html::section("Residuals and coverage", &html::figures(figures))
 }
 
-/// Uncertainty of projections over the image.
-pub(in crate::report) fn uncertainty(camera: &CameraEstimate) -> String {
+/// Uncertainty of projections over the image, and of poses of the target.
+pub(in crate::report) fn uncertainty<'a>(
+    camera: &CameraEstimate,
+    poses: impl Iterator<Item = &'a PoseUncertainty>,
+) -> String {
     let maps = camera.uncertainty_maps();
     if maps.is_empty() {
         return String::new();
@@ -70,5 +73,32 @@ pub(in crate::report) fn uncertainty(camera: &CameraEstimate) -> String {
         html::figures(drawn),
         rows.collect::<String>()
     );
-    html::section("Projection uncertainty", &body)
+    html::section("Projection uncertainty", &(body + &pose_table(poses)))
+}
+
+/// The uncertainty of poses of the target at the distances of interest.
+fn pose_table<'a>(poses: impl Iterator<Item = &'a PoseUncertainty>) -> String {
+    let row = |of: &PoseUncertainty, source: &str, sd: PoseSd| {
+        format!(
+            "<tr><td class=\"words\">{}</td><td>{:.0} mm</td><td class=\"words\">{source}</td><td class=\"number\">{:.4}</td>\
+             <td class=\"number\">{:.4}</td><td class=\"number\">{:.4}</td></tr>",
+            html::escaped(&of.target),
+            of.distance_mm,
+            sd.rotation_rad.to_degrees(),
+            sd.across_mm,
+            sd.along_mm
+        )
+    };
+    let rows: String = poses
+        .map(|of| row(of, "calibration", of.calibration) + &row(of, "1 px of noise", of.per_px))
+        .collect();
+    if rows.is_empty() {
+        return rows;
+    }
+    format!(
+        "<div class=\"wide-table\"><table class=\"plain\"><tr><th class=\"words\">pose of</th><th>distance</th>\
+         <th class=\"words\">source</th><th>rotation, °</th><th>across, mm</th><th>along, mm</th></tr>{rows}</table></div>\
+         <p class=\"note\">Standard deviation of a pose estimated with this calibration, where corners were seen: the rotation per axis, \
+         and the position across and along the line of sight. Errors from noise are proportional to the noise of the corners.</p>"
+    )
 }

@@ -186,8 +186,9 @@ impl SavedCamera {
             .ok_or_else(|| field("parameters", "no known lens has these parameters"))?;
         let values: Vec<f64> = self.parameters.iter().map(|p| p.value).collect();
         let sds: Vec<f64> = self.parameters.iter().filter_map(|p| p.sd).collect();
-        let covariance = covariance_of(&self.correlations, &sds)
-            .ok_or_else(|| field("correlations", "expected one for each pair of parameters"))?;
+        let covariance = of_correlations(&self.correlations, &sds).ok_or_else(|| {
+            field("correlations", "expected one from −1 to 1 for each pair of parameters")
+        })?;
         let observed: Vec<f64> = self.parameters.iter().filter_map(|p| p.observed_sd).collect();
         let projection = self.projection.map(|known| known.read(sds.len(), &observed));
         let projection = projection.transpose().map_err(|wrong| field("projection", wrong))?;
@@ -217,7 +218,21 @@ impl SavedCamera {
     }
 }
 
-/// The covariance matrix from correlations and standard deviations; `None` if a pair of parameters has no correlation.
+/// Rounding errors of correlations, which splines have in nine digits.
+const ROUNDED: f64 = 1e-6;
+
+/// The covariance matrix from correlations and standard deviations; `None` if a pair of parameters has no correlation, or an
+/// impossible one.
+fn of_correlations(rows: &[Vec<f64>], sds: &[f64]) -> Option<Matrix> {
+    let is_possible = |(i, row): (usize, &Vec<f64>)| {
+        let own = row.get(i).is_some_and(|own| (own - 1.0).abs() < ROUNDED);
+        own && row.iter().all(|of| of.abs() < 1.0 + ROUNDED)
+    };
+    let covariance = covariance_of(rows, sds)?;
+    rows.iter().enumerate().all(is_possible).then_some(covariance)
+}
+
+/// The matrix of these rows, scaled by standard deviations; `None` if an element is missing.
 fn covariance_of(rows: &[Vec<f64>], sds: &[f64]) -> Option<Matrix> {
     let n = sds.len();
     // For a spline only the lower triangle is stored.
@@ -237,9 +252,10 @@ impl SavedProjection {
         }
         let alignment = Matrix::from_fn(6, found, |i, j| alignment[i][j]);
         let observed = observed_correlations.zip(observed_freedom).map(|(rows, freedom)| {
-            let covariance = covariance_of(&rows, sds).filter(|_| sds.len() == found);
-            let covariance = covariance
-                .ok_or("`observed_correlations` must have one for each pair of parameters")?;
+            let covariance = of_correlations(&rows, sds).filter(|_| sds.len() == found);
+            let covariance = covariance.ok_or(
+                "`observed_correlations` must have one from −1 to 1 for each pair of parameters",
+            )?;
             let of_board = board.map(|rows| {
                 covariance_of(&rows, &vec![1.0; found])
                     .ok_or("`board_covariance` must have a number for each pair of parameters")
