@@ -2,6 +2,9 @@ use std::ops::Index;
 
 use nalgebra::DMatrix;
 
+/// Rounding errors of correlations, which files may have in nine digits.
+const ROUNDED: f64 = 1e-6;
+
 /// A matrix in a result, such as a covariance.
 ///
 /// ```
@@ -34,6 +37,16 @@ impl Matrix {
 
     pub(crate) fn into_inner(self) -> DMatrix<f64> {
         self.0
+    }
+
+    /// Whether it is symmetric and positive semidefinite up to rounding errors, after scaling by its diagonal.
+    pub fn is_covariance(&self) -> bool {
+        let n = self.0.nrows();
+        let scale = |i: usize| self.0[(i, i)].sqrt();
+        let of = |i: usize, j: usize| self.0[(i, j)] / (scale(i) * scale(j));
+        let is_symmetric = (0..n).all(|i| (0..i).all(|j| (of(i, j) - of(j, i)).abs() < ROUNDED));
+        let lifted = DMatrix::from_fn(n, n, |i, j| of(i, j) + if i == j { ROUNDED } else { 0.0 });
+        self.0.ncols() == n && is_symmetric && lifted.cholesky().is_some()
     }
 
     /// Number of rows.

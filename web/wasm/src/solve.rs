@@ -58,18 +58,18 @@ impl Solved {
             estimate.cameras.first().ok_or_else(|| JsError::new("no camera was calibrated"))?;
         let words = Messages::new(&estimate, None);
         let said = diagnoses.iter().map(|diagnosis| one_line(&words.sentence(diagnosis))).collect();
+        let poses = estimate.pose_uncertainties(std::slice::from_ref(&target));
         let mut page = Report::new("camera", &estimate);
         // Having too few views to compare models is not an error.
         let models = [calibration.compare_models(0).unwrap_or_default()];
         (page.diagnoses, page.stated) = (&diagnoses, calibration.panels());
-        (page.print, page.models) = (print, &models);
+        (page.print, page.models, page.poses) = (print, &models, &poses);
         let figures = serde_json::json!({
             "rms_px": found.rms_px, "views": found.views.len(), "corners": found.corner_count(),
             "names": found.camera.parameter_names(), "values": found.camera.parameters(),
             "sd": found.parameters.iter().map(|parameter| parameter.sd).collect::<Vec<_>>(),
             "projection_sd_px": found.projection_sd_px(None, deltille_calibrate::Source::Noise),
         });
-        let poses = estimate.pose_uncertainties(std::slice::from_ref(&target));
         let json = calibration::write(&estimate, &diagnoses, print, Residuals::Omitted, &poses)
             .unwrap_or_default();
         let file = CameraFile {

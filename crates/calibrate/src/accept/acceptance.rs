@@ -23,7 +23,7 @@ pub struct Acceptance {
     pub unmeasured: Vec<String>,
     /// Names of views that were not measured, because their pose is that of a view of the calibration.
     pub reused: Vec<String>,
-    /// Number of corners of the measured frames, in each of their images.
+    /// Number of corners of the measured frames, in the images of each camera whose calibration lists where it saw corners.
     pub observations: usize,
     /// Number of these where the calibration saw no corners, so that the lens is extrapolated.
     pub extrapolated: usize,
@@ -165,9 +165,12 @@ impl Acceptance {
         })
     }
 
-    /// The judgement of all lengths, the worst of single ones; `None` without a limit.
+    /// The judgement of all lengths, the worst of single ones; `None` without a limit. It is not positive if a given length was
+    /// not measured.
     pub fn verdict(&self) -> Option<Conformity> {
-        self.lengths.iter().filter_map(|of| self.conformity(of)).max()
+        let worst = self.lengths.iter().filter_map(|of| self.conformity(of)).max()?;
+        let is_missing = self.missing().next().is_some();
+        Some(if is_missing { worst.max(Conformity::Undecided) } else { worst })
     }
 }
 

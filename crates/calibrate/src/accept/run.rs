@@ -183,6 +183,7 @@ impl Calibration {
                 return Err(AcceptanceError::Fit { frame, rms_px, is_rig: is_triangulated });
             }
             found.measured.push(name.clone());
+            let views = views.iter().filter(|(camera, _)| !coverages[*camera].is_empty());
             for (camera, view) in views {
                 for (_, seen) in observations(view) {
                     let is_known = coverages[*camera]

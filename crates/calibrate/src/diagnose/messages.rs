@@ -49,10 +49,17 @@ impl<'a> Messages<'a> {
                     100.0 * FOREIGN_PART
                 ),
             ),
-            Diagnosis::UnusableFit { camera, rms_px } => self.of_camera(
-                *camera,
-                does_not_fit(self.model(*camera), *rms_px),
-            ),
+            Diagnosis::UnusableFit { camera, rms_px } => {
+                let text = match self.wrong_constraint(*camera) {
+                    Some(cause) => format!(
+                        "the calibration does not fit the views ({rms_px:.1} px RMS, more than {} % of the image width): \
+                         {cause}, or the model or the labels are wrong",
+                        100.0 * FOREIGN_PART
+                    ),
+                    None => does_not_fit(self.model(*camera), *rms_px),
+                };
+                self.of_camera(*camera, text)
+            }
             Diagnosis::ManyExcluded { excluded, all } => self.many_excluded(*excluded, *all),
             Diagnosis::ManyPanelsExcluded { excluded, all } => format!(
                 "{excluded} of {all} corners (more than a fifth) were excluded with their panels, so the \
@@ -79,13 +86,14 @@ impl<'a> Messages<'a> {
             Diagnosis::CommonOutliers(finding) => self.finding(finding),
             Diagnosis::Remedied { camera, remedy } => self.remedied(*camera, remedy),
             Diagnosis::LackOfFit(misfit) => self.lack_of_fit(misfit),
-            Diagnosis::PoorFit { camera, rms_px } => self.of_camera(
-                *camera,
-                format!(
-                    "residuals are {rms_px:.1} px RMS: {}, or the labels are wrong",
-                    other_lens(self.model(*camera))
-                ),
-            ),
+            Diagnosis::PoorFit { camera, rms_px } => {
+                let cause = self.wrong_constraint(*camera);
+                let cause = cause.map_or(String::new(), |cause| cause + ", or ");
+                let lens = other_lens(self.model(*camera));
+                let text =
+                    format!("residuals are {rms_px:.1} px RMS: {cause}{lens}, or the labels are wrong");
+                self.of_camera(*camera, text)
+            }
             Diagnosis::WrongPrior { camera, parameter, deviations } => self.of_camera(
                 *camera,
                 format!(
@@ -252,6 +260,12 @@ impl<'a> Messages<'a> {
         format!("{of_panel}corner in row {row}, column {col}")
     }
 
+    /// The constraints of a camera as a cause; `None` without any.
+    fn wrong_constraint(&self, camera: usize) -> Option<String> {
+        let constraints = self.estimate.cameras.get(camera)?.described_constraints()?;
+        Some(format!("a constraint is wrong ({constraints})"))
+    }
+
     fn remedied(&self, camera: usize, remedy: &Remedy) -> String {
         let Remedy { alternative, from_px, to_px, excluded_views } = remedy;
         let model = self.model(camera);
@@ -265,12 +279,10 @@ impl<'a> Messages<'a> {
             Alternative::Camera => {
                 (GIVEN_CAMERA.to_owned(), "estimating the intrinsics".to_owned())
             }
-            Alternative::Constraints => {
-                let constraints = self.estimate.cameras.get(camera);
-                let constraints = constraints.and_then(|of| of.described_constraints());
-                let cause = format!("a constraint is wrong ({})", constraints.unwrap_or_default());
-                (cause, "estimating the parameters without constraints".to_owned())
-            }
+            Alternative::Constraints => (
+                self.wrong_constraint(camera).unwrap_or_default(),
+                "estimating the parameters without constraints".to_owned(),
+            ),
             Alternative::Model(other) => (
                 match model {
                     Some(model) => {

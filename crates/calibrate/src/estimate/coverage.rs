@@ -40,6 +40,11 @@ impl Coverage {
         Self { columns, rows, counts }
     }
 
+    /// Whether no corners are known.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.counts.iter().all(|count| *count == 0)
+    }
+
     /// Number of cells along a row, and number of rows.
     pub fn cells(&self) -> [usize; 2] {
         [self.columns, self.rows]

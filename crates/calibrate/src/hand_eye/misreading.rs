@@ -24,18 +24,20 @@ pub enum Misreading {
     Metres,
     /// Translations are in millimetres, not metres.
     Millimetres,
+    /// This axis of the translations has the opposite sign.
+    Mirrored(char),
 }
 
 impl fmt::Display for Misreading {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.look())
+        f.write_str(&self.look())
     }
 }
 
 impl Misreading {
     /// How the poses look.
-    pub(super) fn look(self) -> &'static str {
-        match self {
+    pub(super) fn look(self) -> String {
+        let look = match self {
             Self::Inverted => "inverted",
             Self::QuaternionOrder => "as if w was at the wrong end of the quaternions",
             Self::Degrees => "as if the angles were in degrees",
@@ -44,7 +46,11 @@ impl Misreading {
             Self::Transposed => "as if the rotation matrices were transposed",
             Self::Metres => "as if the translations were in metres",
             Self::Millimetres => "as if the translations were in millimetres",
-        }
+            Self::Mirrored(axis) => {
+                return format!("as if {axis} of the translations had the opposite sign");
+            }
+        };
+        look.to_owned()
     }
 
     /// What to change.
@@ -67,6 +73,7 @@ impl Misreading {
             Self::Transposed => "write matrices by rows".to_owned(),
             Self::Metres => "name the columns _m, or multiply them by 1000".to_owned(),
             Self::Millimetres => "name the columns _mm, or divide them by 1000".to_owned(),
+            Self::Mirrored(_) => "use right-handed axes for translations and rotations".to_owned(),
         }
     }
 }

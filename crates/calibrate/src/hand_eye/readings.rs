@@ -108,10 +108,12 @@ struct Reading {
     is_inverted: bool,
     length: Option<Misreading>,
     rotation: Option<OtherRotation>,
+    /// The axis of the translations whose sign is wrong, and its name.
+    mirrored: Option<(DVec3, char)>,
 }
 
 impl Reading {
-    const STATED: Self = Self { is_inverted: false, length: None, rotation: None };
+    const STATED: Self = Self { is_inverted: false, length: None, rotation: None, mirrored: None };
 
     /// All readings of a notation, those with the fewest differences first.
     fn all(notation: RobotRotation) -> Vec<Self> {
@@ -120,10 +122,17 @@ impl Reading {
         for rotation in rotations {
             for length in [None, Some(Misreading::Metres), Some(Misreading::Millimetres)] {
                 for is_inverted in [false, true] {
-                    all.push(Self { is_inverted, length, rotation: rotation.copied() });
+                    all.push(Self {
+                        is_inverted,
+                        length,
+                        rotation: rotation.copied(),
+                        mirrored: None,
+                    });
                 }
             }
         }
+        let axes = [(DVec3::X, 'x'), (DVec3::Y, 'y'), (DVec3::Z, 'z')];
+        all.extend(axes.map(|axis| Self { mirrored: Some(axis), ..Self::STATED }));
         all.sort_by_key(|reading| reading.differences().len());
         all
     }
@@ -131,7 +140,8 @@ impl Reading {
     fn differences(&self) -> Vec<Misreading> {
         let inverted = self.is_inverted.then_some(Misreading::Inverted);
         let rotation = self.rotation.map(|(misreading, _)| misreading);
-        rotation.into_iter().chain(self.length).chain(inverted).collect()
+        let mirrored = self.mirrored.map(|(_, name)| Misreading::Mirrored(name));
+        rotation.into_iter().chain(self.length).chain(inverted).chain(mirrored).collect()
     }
 
     /// The pose in this reading.
@@ -141,8 +151,9 @@ impl Reading {
             Some(Misreading::Millimetres) => 0.001,
             _ => 1.0,
         };
+        let signs = self.mirrored.map_or(DVec3::ONE, |(axis, _)| DVec3::ONE - 2.0 * axis);
         RobotPose {
-            translation_mm: robot.translation_mm * scale,
+            translation_mm: robot.translation_mm * scale * signs,
             rotation: self.rotation.map_or(robot.rotation, |(_, of)| of(robot.rotation)),
             ..robot.clone()
         }

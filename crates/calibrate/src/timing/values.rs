@@ -65,10 +65,20 @@ pub struct Timing {
 /// few.
 const MISFIT: f64 = 10.0;
 
+/// Shorter intervals of frames are beyond cameras that take whole images.
+const SHORTEST_S: f64 = 1e-4;
+
 impl Timing {
-    /// A sentence about residuals that the timing does not explain, without initial capital and full stop; `None` if it explains them.
+    /// A sentence about time stamps of another unit, or residuals that the timing does not explain, without initial capital and full
+    /// stop; `None` without either.
     pub fn misfit(&self) -> Option<String> {
-        let Self { rms_px, corner_sd_px, .. } = *self;
+        let Self { rms_px, corner_sd_px, interval_s, .. } = *self;
+        if interval_s < SHORTEST_S {
+            return Some(format!(
+                "frames every {:.4} ms: check that the time stamps are in nanoseconds",
+                1e3 * interval_s
+            ));
+        }
         (rms_px > MISFIT * corner_sd_px && corner_sd_px > 0.0).then(|| {
             format!(
                 "residuals of the timing ({rms_px:.3} px) are many times the standard deviation of the corners ({corner_sd_px:.3} px): \

@@ -57,7 +57,7 @@ impl Certificate<'_> {
             false => counted(found.measured.len(), "image"),
         };
         let corners = counted(found.probing.corners, "measured corner");
-        let images = format!("{frames} ({}), {corners}{}", names(&found.measured), out(found));
+        let images = format!("{frames} ({}), {corners}{}", listed(&found.measured), out(found));
         let tested = &self.tested;
         let mut rows = vec![
             ("Calibration", tested.calibration.clone()),
@@ -69,9 +69,13 @@ impl Certificate<'_> {
         }
         let known = match &tested.lengths {
             Some(file) => {
-                let missing = match found.missing().count() {
-                    0 => String::new(),
-                    count => format!("; {} of the table never seen", counted(count, "length")),
+                let missing: Vec<String> = found
+                    .missing()
+                    .map(|of| of.ends.map(|end| corner(&end, found.has_panels())).join(" – "))
+                    .collect();
+                let missing = match missing.as_slice() {
+                    [] => String::new(),
+                    all => format!("; not measured: {}", listed(all)),
                 };
                 format!("{}, known from {file}{missing}", counted(found.lengths.len(), "length"))
             }
@@ -148,19 +152,26 @@ fn out(found: &Acceptance) -> String {
     }
 }
 
-/// Length of the list of images, characters: about two lines of the page.
-const NAMES: usize = 120;
+/// Length of a list, characters: about one line of the page.
+const LISTED: usize = 70;
 
-/// The first images, as many as there is room for; the JSON has all.
-fn names(all: &[String]) -> String {
+/// Length of a name in a list, characters.
+const NAME: usize = 40;
+
+/// The first names, as many as there is room for; the JSON has all.
+fn listed(all: &[String]) -> String {
     let mut text = String::new();
     for (index, name) in all.iter().enumerate() {
-        if text.len() + name.len() > NAMES {
+        let short = match name.chars().count() {
+            ..=NAME => name.clone(),
+            count => format!("…{}", name.chars().skip(count - NAME).collect::<String>()),
+        };
+        if index > 0 && text.len() + short.len() > LISTED {
             let _ = write!(text, " and {} more", all.len() - index);
             break;
         }
         text += if index == 0 { "" } else { ", " };
-        text += name;
+        text += &short;
     }
     text
 }
@@ -182,6 +193,9 @@ fn verdict(found: &Acceptance) -> String {
             "fails",
             "<b>Does not conform.</b> At least one error exceeds the limit by more than its expanded uncertainty.",
         ),
+        Some(Conformity::Undecided) if found.count(Conformity::Undecided) == 0 => {
+            ("undecided", "<b>Undecided.</b> Given lengths were not measured.")
+        }
         Some(Conformity::Undecided) => (
             "undecided",
             "<b>Undecided.</b> The limit is within the expanded uncertainty of at least one error.",

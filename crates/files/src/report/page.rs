@@ -54,6 +54,7 @@ fn html(report: &Report) -> String {
     page += "</ul></section>\n";
     if report.is_rig() {
         page += &rig::places(report);
+        page += &rig::distances(report);
         page += &rig::targets(report);
         page += &shared(report);
     }

@@ -27,7 +27,7 @@ pub struct Args {
     #[command(flatten)]
     views: NewViewsArgs,
     /// Largest permitted error of a length L, such as 0.1mm or 0.05mm+L/2000; without it, errors are reported and not judged
-    #[arg(long, value_name = "LENGTH[+L/N]", value_parser = limit)]
+    #[arg(long, value_name = "LENGTH[+L/N]", value_parser = limit, allow_hyphen_values = true)]
     limit: Option<Limit>,
     /// Table of lengths on the target that were measured by other means: CSV with the columns row_a, col_a, row_b, col_b,
     /// length_mm, sd_mm, and panel_a, panel_b for several panels [default: lengths between corners as described]
@@ -75,11 +75,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             log!("note: not measured: {}, such as {first}: {why}", counted(names.len(), "image"));
         }
     }
-    if let Some(first) = found.missing().next() {
-        let [from, to] = first.ends.map(|end| corner(&found, &end));
-        let missing = counted(found.missing().count(), "length");
+    for of in found.missing() {
+        let [from, to] = of.ends.map(|end| corner(&found, &end));
         log!(
-            "warning: --lengths: {missing} not measured, such as from {from} to {to}: both ends were never seen together"
+            "warning: --lengths: the length from {from} to {to} was not measured: its ends were never seen together"
         );
     }
     if found.extrapolated > 0 {
@@ -206,6 +205,9 @@ fn describe(found: &Acceptance) -> String {
         Some(Conformity::Conforms) => format!("conforms: all {all} lengths"),
         Some(Conformity::Fails) => {
             format!("does not conform: {} of {all} lengths", found.count(Conformity::Fails))
+        }
+        Some(Conformity::Undecided) if found.count(Conformity::Undecided) == 0 => {
+            format!("undecided: {} not measured", counted(found.missing().count(), "given length"))
         }
         Some(Conformity::Undecided) => {
             format!("undecided: {} of {all} lengths", found.count(Conformity::Undecided))

@@ -33,6 +33,32 @@ pub(in crate::report) fn places(report: &Report) -> String {
     )
 }
 
+/// The uncertainty of distances that pairs of cameras measure.
+pub(in crate::report) fn distances(report: &Report) -> String {
+    let name = |camera: usize| escaped(&report.estimate.cameras[camera].name);
+    let rows = report.estimate.depth_uncertainties().into_iter().map(|([first, second], of)| {
+        format!(
+            "<tr><td>{} and {}</td><td class=\"number\">{:.0}</td><td class=\"number\">{:.4}</td><td class=\"number\">{:.3}</td>\
+             </tr>",
+            name(first),
+            name(second),
+            of.distance_mm,
+            of.sd_mm,
+            of.mm_per_px
+        )
+    });
+    let rows: String = rows.collect();
+    if rows.is_empty() {
+        return rows;
+    }
+    format!(
+        "<section><h2>Triangulated distances</h2><div class=\"wide-table\"><table class=\"plain\"><tr><th>cameras</th>\
+         <th>distance, mm</th><th>1σ from the calibration, mm</th><th>1σ for 1 px of noise, mm</th></tr>{rows}</table></div>\
+         <p class=\"note\">Distances from the first of two cameras, where it saw corners and the second one sees the point too. \
+         Errors from noise are proportional to the noise of the pixels.</p></section>\n"
+    )
+}
+
 /// Relative poses of targets, where there are several.
 pub(in crate::report) fn targets(report: &Report) -> String {
     let targets = &report.estimate.targets;

@@ -9,6 +9,9 @@ pub enum SavedError {
     /// The file is neither the calibration of a camera nor of a rig.
     #[error("not a calibration written by {CalibrationWrite} or {RigWrite}")]
     Foreign,
+    /// The text is not complete.
+    #[error("{0}")]
+    Incomplete(String),
     /// A field is missing or has an invalid value.
     #[error("field `{field}`: {problem}")]
     Field {

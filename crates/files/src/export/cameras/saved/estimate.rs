@@ -187,7 +187,10 @@ impl SavedCamera {
         let values: Vec<f64> = self.parameters.iter().map(|p| p.value).collect();
         let sds: Vec<f64> = self.parameters.iter().filter_map(|p| p.sd).collect();
         let covariance = of_correlations(&self.correlations, &sds).ok_or_else(|| {
-            field("correlations", "expected one from −1 to 1 for each pair of parameters")
+            field(
+                "correlations",
+                "expected those of a positive definite matrix, one for each pair of parameters",
+            )
         })?;
         let observed: Vec<f64> = self.parameters.iter().filter_map(|p| p.observed_sd).collect();
         let projection = self.projection.map(|known| known.read(sds.len(), &observed));
@@ -196,7 +199,13 @@ impl SavedCamera {
         let parameters =
             parameters.map(|p| Parameter { name: p.name.clone(), value: p.value, sd: p.sd });
         let place = self.camera_from_rig.as_ref();
-        let mut camera = CameraEstimate::given(name, blank.with_parameters(&values));
+        let camera = blank.with_parameters(&values);
+        if !camera.focal_px.to_array().iter().all(|focal| FOCAL_PX.contains(focal)) {
+            let [low, high] = [FOCAL_PX.start(), FOCAL_PX.end()];
+            let problem = format!("the focal lengths are not between {low} and {high:e} px");
+            return Err(field("parameters", &problem));
+        }
+        let mut camera = CameraEstimate::given(name, camera);
         camera.model = self.model.parse().ok();
         camera.parameters = parameters.collect();
         camera.constraints = self.constraints.into_iter().map(ConstraintRecord::read).collect();
@@ -218,18 +227,18 @@ impl SavedCamera {
     }
 }
 
-/// Rounding errors of correlations, which splines have in nine digits.
-const ROUNDED: f64 = 1e-6;
+/// Focal lengths of cameras, as in camera files.
+const FOCAL_PX: std::ops::RangeInclusive<f64> = 0.1..=1e8;
+
+/// Tolerance of the correlation of a parameter with itself.
+const UNIT: f64 = 1e-6;
 
 /// The covariance matrix from correlations and standard deviations; `None` if a pair of parameters has no correlation, or an
 /// impossible one.
 fn of_correlations(rows: &[Vec<f64>], sds: &[f64]) -> Option<Matrix> {
-    let is_possible = |(i, row): (usize, &Vec<f64>)| {
-        let own = row.get(i).is_some_and(|own| (own - 1.0).abs() < ROUNDED);
-        own && row.iter().all(|of| of.abs() < 1.0 + ROUNDED)
-    };
-    let covariance = covariance_of(rows, sds)?;
-    rows.iter().enumerate().all(is_possible).then_some(covariance)
+    let correlations = covariance_of(rows, &vec![1.0; sds.len()])?;
+    let has_units = (0..sds.len()).all(|i| (correlations[(i, i)] - 1.0).abs() < UNIT);
+    (has_units && correlations.is_covariance()).then(|| covariance_of(rows, sds))?
 }
 
 /// The matrix of these rows, scaled by standard deviations; `None` if an element is missing.
@@ -254,7 +263,7 @@ impl SavedProjection {
         let observed = observed_correlations.zip(observed_freedom).map(|(rows, freedom)| {
             let covariance = of_correlations(&rows, sds).filter(|_| sds.len() == found);
             let covariance = covariance.ok_or(
-                "`observed_correlations` must have one from −1 to 1 for each pair of parameters",
+                "`observed_correlations` must be positive definite, with one for each pair of parameters",
             )?;
             let of_board = board.map(|rows| {
                 covariance_of(&rows, &vec![1.0; found])

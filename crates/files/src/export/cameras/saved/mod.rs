@@ -15,6 +15,7 @@ mod record;
 use deltille_calibrate::{Estimate, Reference};
 use deltille_core::json;
 use deltille_core::json::ReadError;
+use deltille_core::reading::in_words;
 use deltille_core::targets::{Target, TargetIdentity, check_result_of};
 use serde::Deserialize;
 
@@ -39,7 +40,7 @@ pub fn read(text: &str, reference: &Reference) -> Result<Estimate, SavedError> {
 
 fn estimate(text: &str, reference: Panels) -> Result<Estimate, SavedError> {
     let wrong = |error| match error {
-        ReadError::Json(_) => SavedError::Foreign,
+        ReadError::Json(problem) => SavedError::Incomplete(in_words(&problem)),
         ReadError::Field { field, problem } => SavedError::Field { field, problem },
     };
     match json::schema(text.as_bytes()).ok().flatten().as_deref() {
