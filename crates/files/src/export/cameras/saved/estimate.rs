@@ -6,6 +6,7 @@ use deltille_calibrate::{
     TargetEstimate, TargetMap, ViewEstimate,
 };
 use deltille_core::camera::{Camera, Lens, LensKind, PROJECTION_PARAMETERS, Pose, SplineGrid};
+use deltille_core::quantity;
 use glam::{DVec2, DVec3};
 
 use super::super::constraint::ConstraintRecord;
@@ -200,10 +201,9 @@ impl SavedCamera {
             parameters.map(|p| Parameter { name: p.name.clone(), value: p.value, sd: p.sd });
         let place = self.camera_from_rig.as_ref();
         let camera = blank.with_parameters(&values);
-        if !camera.focal_px.to_array().iter().all(|focal| FOCAL_PX.contains(focal)) {
-            let [low, high] = [FOCAL_PX.start(), FOCAL_PX.end()];
-            let problem = format!("the focal lengths are not between {low} and {high:e} px");
-            return Err(field("parameters", &problem));
+        for focal in camera.focal_px.to_array() {
+            let checked = quantity::focal_px::RANGE.check(focal);
+            checked.map_err(|wrong| field("parameters", &format!("focal length: {wrong}")))?;
         }
         let mut camera = CameraEstimate::given(name, camera);
         camera.model = self.model.parse().ok();
@@ -226,9 +226,6 @@ impl SavedCamera {
         Ok(camera)
     }
 }
-
-/// Focal lengths of cameras, as in camera files.
-const FOCAL_PX: std::ops::RangeInclusive<f64> = 0.1..=1e8;
 
 /// Tolerance of the correlation of a parameter with itself.
 const UNIT: f64 = 1e-6;
