@@ -94,6 +94,17 @@ pub enum ConstraintError {
     },
 }
 
+impl CalibrationError {
+    /// Whether a constraint is unusable, whatever the views show.
+    pub(crate) fn is_of_constraint(&self) -> bool {
+        match self {
+            Self::Constraint(_) => true,
+            Self::OfCamera { error, .. } => error.is_of_constraint(),
+            _ => false,
+        }
+    }
+}
+
 /// Why a calibration failed. Each message says what to do about it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -149,6 +160,16 @@ pub enum CalibrationError {
     WrongCameras {
         /// Names of the cameras.
         cameras: String,
+        /// The failure.
+        error: Box<CalibrationError>,
+    },
+    /// Constraints without which the calibration succeeds.
+    #[error(
+        "the constraints ({constraints}) contradict the views, which can be calibrated without them; with them: {error}"
+    )]
+    WrongConstraints {
+        /// The constraints.
+        constraints: String,
         /// The failure.
         error: Box<CalibrationError>,
     },

@@ -105,9 +105,13 @@ impl Calibration {
         let (mut selected, mut change_px) = (None, f64::INFINITY);
         let mut before = BTreeMap::new();
         for _ in 0..MAX_ROUNDS {
-            let Compensated { timing, views } = Compensated::of(&cameras, &panels)?;
-            let selected =
-                selected.get_or_insert_with(|| self.with_views(&views).selected_frames(most));
+            let Compensated { timing, views, mut motion_px } = Compensated::of(&cameras, &panels)?;
+            if timing.is_determined() {
+                // Motion is no error of compensated corners.
+                motion_px.values_mut().for_each(|px| *px = 0.0);
+            }
+            let select = || self.with_views(&views).selected_frames(&motion_px, most);
+            let selected = selected.get_or_insert_with(select);
             let views = views.into_iter().map(|mut of_camera| {
                 of_camera.retain(|view| selected.contains(&view.name));
                 of_camera
@@ -171,11 +175,12 @@ impl Calibration {
         self.of_cameras(cameras.collect())
     }
 
-    /// The most informative of the frames. Motion is no error of compensated corners.
-    fn selected_frames(&self, most: usize) -> BTreeSet<String> {
+    /// The most informative of the frames, with these motions.
+    fn selected_frames(&self, motion_px: &BTreeMap<String, f64>, most: usize) -> BTreeSet<String> {
         let all = self.moments();
+        let with_motion = |name: &String| Some((name.clone(), *motion_px.get(name)?));
         let some: BTreeMap<String, f64> =
-            evenly(&all, CANDIDATES).map(|name| (name.clone(), 0.0)).collect();
+            evenly(&all, CANDIDATES).filter_map(with_motion).collect();
         let views = self.cameras.iter().map(|of| {
             of.views.iter().filter(|view| some.contains_key(&view.name)).cloned().collect()
         });
@@ -258,7 +263,7 @@ fn closest(poses: &[(f64, Pose)]) -> Option<(f64, Pose)> {
 mod tests {
     use super::*;
     use crate::estimate::values::CameraEstimate;
-    use crate::timing::simulated::{NOISE_PX, filmed, right_from_left};
+    use crate::timing::simulated::{NOISE_PX, filmed, filmed_in, resting, right_from_left};
     use deltille_core::camera::{BrownConrady, Lens};
 
     fn truth() -> Camera {
@@ -272,8 +277,12 @@ mod tests {
 
     /// The calibration of the first `count` cameras, and the time stamps of their frames.
     fn recorded(count: usize, clocks: [[f64; 3]; 2], seed: u64) -> (Calibration, Vec<Times>) {
+        given(filmed(&truth(), clocks, seed).into_iter().take(count))
+    }
+
+    fn given(cameras: impl Iterator<Item = TimedCamera>) -> (Calibration, Vec<Times>) {
         let (mut calibration, mut times_ns) = (Calibration::new([Pose::IDENTITY]), Vec::new());
-        for of in filmed(&truth(), clocks, seed).into_iter().take(count) {
+        for of in cameras {
             times_ns.push(of.views.iter().map(|(ns, view)| (view.name.clone(), *ns)).collect());
             let views = of.views.into_iter().map(|(_, view)| view).collect();
             calibration = calibration.camera(&of.name, views, Model::Radtan);
@@ -309,6 +318,36 @@ mod tests {
             let readout = timing.cameras[0].readout_s.unwrap();
             assert!((readout.value - readout_s).abs() < 4.0 * readout.sd, "{readout:?}");
         }
+    }
+
+    #[test]
+    fn a_board_may_rest_most_of_the_time() {
+        for (seed, readout_s) in [(0, 0.012), (1, -0.03)] {
+            let cameras = filmed_in(&truth(), [[readout_s, 0.0, 0.0]; 2], seed, resting);
+            let (all, times_ns) = given(cameras.into_iter().take(1));
+            let (found, timing) = all.compensated_for_timing(&times_ns, 60).unwrap();
+            let estimate = found.solve().unwrap();
+            let squares = squares(&estimate.cameras[0]);
+            assert!(squares.iter().all(|square| *square < 12.0), "{squares:?}");
+            assert!(estimate.rms_px < 1.1 * NOISE_PX, "{}", estimate.rms_px);
+            // The path between frames is not quite that of its model.
+            let readout = timing.cameras[0].readout_s.unwrap().value;
+            assert!((readout / readout_s - 1.0).abs() < 0.005, "{readout}");
+        }
+    }
+
+    #[test]
+    fn frames_at_rest_are_selected_where_motion_counts() {
+        let [left, _] = filmed_in(&truth(), [[0.0; 3]; 2], 0, resting);
+        let Compensated { motion_px, .. } =
+            Compensated::of(std::slice::from_ref(&left), &[Pose::IDENTITY]).unwrap();
+        let (all, _) = given(std::iter::once(left));
+        let fastest =
+            |of: BTreeSet<String>| of.iter().map(|name| motion_px[name]).fold(0.0, f64::max);
+        let at_rest = fastest(all.selected_frames(&motion_px, 20));
+        let none = motion_px.keys().map(|name| (name.clone(), 0.0)).collect();
+        let any = fastest(all.selected_frames(&none, 20));
+        assert!(at_rest < 1.0 && any > 10.0, "{at_rest} {any}");
     }
 
     #[test]

@@ -44,17 +44,7 @@ impl Calibration {
 
     fn solved(&self) -> Result<Estimate, CalibrationError> {
         let (own, test) = self.split()?;
-        let estimate = own.adjusted().map_err(|error| match own.foreign_cameras().as_slice() {
-            [] => error,
-            foreign => CalibrationError::WrongCameras {
-                cameras: foreign
-                    .iter()
-                    .map(|&c| &*self.cameras[c].name)
-                    .collect::<Vec<_>>()
-                    .join(", "),
-                error: Box::new(error),
-            },
-        })?;
+        let estimate = own.adjusted().map_err(|error| own.with_cause(error))?;
         let held_out = match test {
             Some(test) => Some(Box::new(test.given(&estimate).adjusted()?)),
             None if self.measure_target => self.cross_validated(),
@@ -64,6 +54,28 @@ impl Calibration {
         let mut estimate = Estimate { held_out, calibrated_with, ..estimate };
         estimate.findings.extend(estimate.of_measured_corners());
         Ok(estimate)
+    }
+
+    /// A failure with what was stated about the cameras and contradicts the images: given intrinsics, or constraints.
+    pub(crate) fn with_cause(&self, error: CalibrationError) -> CalibrationError {
+        if let foreign @ [_, ..] = self.foreign_cameras().as_slice() {
+            let names: Vec<&str> = foreign.iter().map(|&c| &*self.cameras[c].name).collect();
+            let (cameras, error) = (names.join(", "), Box::new(error));
+            return CalibrationError::WrongCameras { cameras, error };
+        }
+        let is_free = || self.unconstrained().is_some_and(|free| free.adjusted().is_ok());
+        if error.is_of_constraint() || !is_free() {
+            return error;
+        }
+        let of_camera = |camera: &CameraViews| match self.cameras.len() {
+            1 => String::new(),
+            _ => format!("{}:", camera.name),
+        };
+        let constraints = self.cameras.iter().flat_map(|camera| {
+            camera.constraints.iter().map(|of| format!("{}{of}", of_camera(camera)))
+        });
+        let constraints = constraints.collect::<Vec<_>>().join("; ");
+        CalibrationError::WrongConstraints { constraints, error: Box::new(error) }
     }
 
     /// Every third view with the map and the cameras of the others; `None` if these do not suffice for a calibration.

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use deltille::calibrate::{
-    self, Calibration, CalibrationError, CameraEstimate, HandEyeError, HandEyeRequest, Intrinsics,
-    Mounting, RobotNoise, RobotPose, RobotPoses, RobotRotation, views,
+    self, Calibration, CalibrationError, CameraEstimate, Diagnosis, HandEyeError, HandEyeRequest,
+    Intrinsics, Messages, Mounting, RobotNoise, RobotPose, RobotPoses, RobotRotation, views,
 };
 use deltille::export::hand_eye;
 use deltille::limits::Limits;
@@ -95,11 +95,13 @@ impl HandEye {
         (self.0.noise.rotation_rad.to_degrees(), self.0.noise.translation_mm)
     }
 
-    /// Statements about the robot that the detections contradict (the scale of its translations, ``robot_noise``), in
-    /// sentences.
+    /// What the detections contradict of the statements about the robot (the scale of its translations, ``robot_noise``), of
+    /// the camera and of the board, in sentences.
     #[getter]
     fn findings(&self) -> Vec<String> {
-        self.0.contradictions.iter().map(ToString::to_string).collect()
+        let words = Messages::new(&self.0.cameras, None);
+        let of_robot = self.0.contradictions.iter().map(ToString::to_string);
+        of_robot.chain(self.0.diagnoses.iter().map(|said| words.sentence(said))).collect()
     }
 
     /// The camera, with its parameters after the adjustment.
@@ -252,12 +254,16 @@ pub fn hand_eye_of(
     let calibration = Calibration::of(&reference, panels).camera("camera", views, intrinsics);
     let request = HandEyeRequest { robot, mounting, noise, scale, earlier };
     let found = unlocked(py, move || calibration.hand_eye(&request, &given))?;
-    found.map(HandEye).map_err(|error| match error {
+    let found = found.map_err(|error| match error {
         HandEyeError::Calibration(error) => {
             Err::<(), CalibrationError>(error).raise(errors::calibration).unwrap_err()
         }
         error => wrong(error.to_string()),
-    })
+    })?;
+    match found.diagnoses.iter().find(|said| matches!(said, Diagnosis::WrongCamera { .. })) {
+        Some(foreign) => Err(wrong(Messages::new(&found.cameras, None).sentence(foreign))),
+        None => Ok(HandEye(found)),
+    }
 }
 
 /// The poses of a robot; those of a sequence name their detections, so that some may be missing.

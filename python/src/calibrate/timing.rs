@@ -186,6 +186,6 @@ pub fn timing_of(
     }
     let found = unlocked(py, move || calibrate::timing(&cameras, &panels))?;
     let found = found.map_err(|error| wrong(error.to_string()))?;
-    found.misfit().iter().try_for_each(|said| warn(py, said))?;
+    found.warnings().iter().try_for_each(|said| warn(py, said))?;
     Ok(Timing(found))
 }

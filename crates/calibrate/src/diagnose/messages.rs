@@ -103,7 +103,11 @@ impl<'a> Messages<'a> {
                 ),
             ),
             Diagnosis::IllConditioned { camera, parameters, sufficient } => {
-                self.of_camera(*camera, ill_conditioned(parameters, *sufficient))
+                let mut text = ill_conditioned(parameters, *sufficient);
+                if let Some(cause) = self.wrong_constraint(*camera) {
+                    text += &format!(". They may compensate for an error: check whether {cause}");
+                }
+                self.of_camera(*camera, text)
             }
         }
     }

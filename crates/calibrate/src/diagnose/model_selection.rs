@@ -86,11 +86,12 @@ impl Calibration {
         self.of_cameras(vec![camera]).covariance_of_all(false)
     }
 
-    /// This calibration of one camera without constraints; `None` if it has none.
-    fn unconstrained(&self) -> Option<Self> {
-        let camera = CameraViews { constraints: Vec::new(), ..self.cameras[0].clone() };
-        let is_constrained = !self.cameras[0].constraints.is_empty();
-        is_constrained.then(|| self.of_cameras(vec![camera]).covariance_of_all(false))
+    /// This calibration without constraints; `None` if it has none.
+    pub(crate) fn unconstrained(&self) -> Option<Self> {
+        let is_constrained = self.cameras.iter().any(|of| !of.constraints.is_empty());
+        let free = |of: &CameraViews| CameraViews { constraints: Vec::new(), ..of.clone() };
+        let cameras = || self.cameras.iter().map(free).collect();
+        is_constrained.then(|| self.of_cameras(cameras()).covariance_of_all(false))
     }
 
     /// This calibration of one camera with other intrinsics.

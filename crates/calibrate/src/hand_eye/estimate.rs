@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::contradictions::Contradiction;
 use super::pairing::PairedBy;
+use crate::diagnose::diagnosis::Diagnosis;
 use crate::estimate::values::Estimate;
 use crate::input::robot::{Mounting, RobotNoise};
 use crate::matrix::Matrix;
@@ -29,6 +30,10 @@ pub struct HandEye {
     pub noise_freedom: Option<[f64; 2]>,
     /// What the photographs contradict of what was stated about the robot.
     pub contradictions: Vec<Contradiction>,
+    /// What the photographs contradict of the camera, the board and the lens model, see [`Calibration::explain`].
+    ///
+    /// [`Calibration::explain`]: crate::Calibration::explain
+    pub diagnoses: Vec<Diagnosis>,
     /// RMS angles of the rotations of the flange about their principal axes, rad, with these axes in the frame of the base;
     /// the largest first. The second should be 10° or more.
     pub rotation_spread: [(f64, DVec3); 3],

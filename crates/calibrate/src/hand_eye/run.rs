@@ -96,6 +96,7 @@ impl Calibration {
         let joint = adjusted(problem, &whitening, self, asked.noise, &measured)?;
         let covariance = joint.covariance(variance).ok_or(HandEyeError::Undetermined)?;
         let contradictions = contradictions(&joint, &whitening, self, asked, &measured);
+        let diagnoses = self.explain(&estimate);
         let problem = &joint.minimum.problem;
         let robot = problem.robot.as_ref().ok_or(HandEyeError::Undetermined)?;
         let names = || estimate.frames.iter().map(|frame| frame.name.clone());
@@ -114,6 +115,7 @@ impl Calibration {
             noise: robot.noise,
             noise_freedom: asked.noise.is_none().then_some(joint.components.freedom),
             contradictions,
+            diagnoses,
             rotation_spread,
             paired_by: pairing.by,
             rms_px: (sum / f64::max(count, 1.0)).sqrt(),

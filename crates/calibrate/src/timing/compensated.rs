@@ -7,6 +7,8 @@
 //! π is the projection of the corner, and P the path of the target about the frame. Since both projections are at almost the
 //! same pixel, their errors cancel, and the covariance of the corner remains.
 
+use std::collections::BTreeMap;
+
 use super::equations::{Clock, Group, row};
 use super::run::Solved;
 use super::values::{TimedCamera, Timing, TimingError};
@@ -18,6 +20,8 @@ pub(crate) struct Compensated {
     pub timing: Timing,
     /// By camera: one view for each frame of the first camera with neighbours, and named after it.
     pub views: Vec<Vec<View>>,
+    /// By frame: displacement of a corner in the images of the first camera until the next frame, RMS px.
+    pub motion_px: BTreeMap<String, f64>,
 }
 
 impl Compensated {
@@ -26,8 +30,13 @@ impl Compensated {
         let solved = Solved::of(cameras, panels)?;
         let clocks = significant(&solved.timing);
         let mut views = vec![Vec::new(); cameras.len()];
+        let mut motion_px = BTreeMap::new();
         for group in solved.groups(&clocks) {
-            let Some((_, _, frame)) = group.images.first() else { continue };
+            let (Some((_, _, frame)), [first, ..]) = (group.images.first(), cameras) else {
+                continue;
+            };
+            let moved_px = displacement(&group, first, panels, frame, solved.timing.interval_s);
+            motion_px.extend(moved_px.map(|px| (frame.name.clone(), px)));
             for (index, of) in cameras.iter().enumerate() {
                 let clock = &clocks[index];
                 let images = group.images.iter().filter(|(camera, ..)| *camera == index);
@@ -39,7 +48,7 @@ impl Compensated {
                 views[index].extend(view.map(|view| View { name: frame.name.clone(), ..view }));
             }
         }
-        Ok(Self { timing: solved.timing, views })
+        Ok(Self { timing: solved.timing, views, motion_px })
     }
 }
 
@@ -51,6 +60,28 @@ fn significant(timing: &Timing) -> Vec<Clock> {
         Clock { readout_s, offset_s, drift }
     });
     cameras.collect()
+}
+
+/// The displacement of the corners of a view in a time after it, RMS px; `None` if a camera cannot image a corner.
+fn displacement(
+    group: &Group<'_>,
+    of: &TimedCamera,
+    panels: &[Pose],
+    view: &View,
+    time_s: f64,
+) -> Option<f64> {
+    let poses = [group.pose, group.motion.pose(&group.pose, time_s)];
+    let (mut sum, mut count) = (0.0, 0.0);
+    for Sighting { panel, observations } in &view.sightings {
+        for seen in observations {
+            let on_target = panels[panel.index()].apply(seen.panel_mm);
+            let [now, then] = poses
+                .map(|pose| of.camera.project(of.camera_from_rig.after(&pose).apply(on_target)));
+            sum += now?.distance_squared(then?);
+            count += 1.0;
+        }
+    }
+    (count > 0.0).then(|| f64::sqrt(sum / count))
 }
 
 /// The view at the time of the frame; `None` if a camera cannot image a corner.

@@ -37,7 +37,7 @@ const SEARCHED: i32 = 8;
 /// Largest RMS residual, relative to the longer side of the image: as in a check of a camera.
 const FITS: f64 = 0.005;
 
-/// Smallest motion from frame to frame, in standard deviations of a corner: below, velocities are mostly noise.
+/// Smallest mean motion from frame to frame, in standard deviations of a corner: below, velocities are mostly noise.
 const MOVES: f64 = 10.0;
 
 /// The ratio of the median of the length of a two-dimensional normal vector to its standard deviation per axis.
@@ -293,7 +293,9 @@ impl<'a> Setting<'a> {
         let speed_px_s = median(speeds(0)).unwrap_or(0.0);
         let variance = median(raw().map(|(_, variance)| *variance).collect());
         let corner_sd_px = variance.unwrap_or(0.0).sqrt();
-        let moves = speed_px_s * self.interval_s > MOVES * corner_sd_px;
+        // Frames of a target at rest hardly count.
+        let mean_px_s = speeds(0).iter().sum::<f64>() / speeds(0).len().max(1) as f64;
+        let moves = mean_px_s * self.interval_s > MOVES * corner_sd_px;
         let unknowns = self.priors().iter().filter(|sd| **sd > 0.0).count();
         let determined = |value: f64, index: usize, prior: f64| {
             let few = few(images(index / OF_CAMERA), unknowns).filter(|_| moves)?;
@@ -316,6 +318,7 @@ impl<'a> Setting<'a> {
                 offset_s: other(clock.offset_s, 1, near),
                 drift: other(clock.drift, 2, PRIOR_DRIFT),
                 frames: images(index),
+                earlier_frames: of.earlier_frames(),
             }
         });
         Timing {

@@ -23,13 +23,36 @@ fn pose(time: f64) -> Pose {
     Pose { rotation, translation: place + DVec3::new(-80.0, 80.0, 450.0) }
 }
 
+/// How far along its path a board is at a time.
+pub(crate) type Progress = fn(f64) -> f64;
+
+/// Without rests.
+fn steady(time: f64) -> f64 {
+    time
+}
+
+/// Rests of a second between movements of half a second.
+pub(crate) fn resting(time: f64) -> f64 {
+    let (whole, part) = ((time / 1.5).floor(), (time / 1.5).fract());
+    let moved = ((part - 2.0 / 3.0) * 3.0).max(0.0);
+    // Smooth up to the second derivative.
+    1.5 * (whole + moved.powi(3) * (10.0 - moved * (15.0 - 6.0 * moved)))
+}
+
 /// An image whose middle row is exposed at this time.
-fn view(of: &TimedCamera, time: f64, readout: f64, random: &mut ChaCha8Rng) -> Option<View> {
+fn view(
+    of: &TimedCamera,
+    [time, readout]: [f64; 2],
+    progress: Progress,
+    random: &mut ChaCha8Rng,
+) -> Option<View> {
     let mut observations = Vec::new();
     for (row, col) in (0..7).flat_map(|row| (0..8).map(move |col| (row, col))) {
         let panel_mm = DVec3::new(20.0 * f64::from(col), 20.0 * f64::from(row), 0.0);
-        let at =
-            |time: f64| of.camera.project(of.camera_from_rig.after(&pose(time)).apply(panel_mm));
+        let at = |time: f64| {
+            let rig_from_board = pose(progress(time));
+            of.camera.project(of.camera_from_rig.after(&rig_from_board).apply(panel_mm))
+        };
         let mut pixel = at(time)?;
         for _ in 0..5 {
             pixel = at(time + readout * ((pixel.y + 0.5) / f64::from(of.camera.height) - 0.5))?;
@@ -53,6 +76,16 @@ pub(crate) fn right_from_left() -> Pose {
 /// Two cameras with these readouts, offsets and drifts, which film at 30 and 25 frames a second for 10 s. Each seed has another
 /// motion and other noise.
 pub(crate) fn filmed(camera: &Camera, clocks: [[f64; 3]; 2], seed: u64) -> [TimedCamera; 2] {
+    filmed_in(camera, clocks, seed, steady)
+}
+
+/// The same with another progress along the path.
+pub(crate) fn filmed_in(
+    camera: &Camera,
+    clocks: [[f64; 3]; 2],
+    seed: u64,
+    progress: Progress,
+) -> [TimedCamera; 2] {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let start = 13.7 * seed as f64;
     [(Pose::IDENTITY, 30.0, "left"), (right_from_left(), 25.0, "right")].map(
@@ -65,7 +98,7 @@ pub(crate) fn filmed(camera: &Camera, clocks: [[f64; 3]; 2], seed: u64) -> [Time
             for index in 0..(SECONDS * rate) as usize {
                 let stamp = index as f64 / rate;
                 let time = start + stamp + offset + drift * (stamp - middle);
-                if let Some(view) = view(&of, time, readout, &mut random) {
+                if let Some(view) = view(&of, [time, readout], progress, &mut random) {
                     let image = format!("{}-{index:06}", of.name);
                     let view = View { name: image.clone(), image, ..view };
                     of.views.push(((stamp * 1e9) as i64 + 1_000_000_000_000, view));

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::estimate::values::CameraEstimate;
 use crate::input::observation::View;
+use crate::input::order::in_order;
 use deltille_core::camera::{Camera, Pose};
 
 /// A calibrated camera and its views.
@@ -20,6 +21,14 @@ pub struct TimedCamera {
 }
 
 impl TimedCamera {
+    /// Number of views with an earlier time stamp than the one before it, in the order of their names.
+    pub(super) fn earlier_frames(&self) -> usize {
+        let times: BTreeMap<&str, i64> =
+            self.views.iter().map(|(ns, view)| (view.name.as_str(), *ns)).collect();
+        let order = in_order(times.keys().copied().collect());
+        order.windows(2).filter(|two| times[two[1].as_str()] < times[two[0].as_str()]).count()
+    }
+
     /// A calibrated camera with those of its views that have a time stamp, ns, by name.
     ///
     /// # Errors
@@ -69,22 +78,37 @@ const MISFIT: f64 = 10.0;
 const SHORTEST_S: f64 = 1e-4;
 
 impl Timing {
-    /// A sentence about time stamps of another unit, or residuals that the timing does not explain, without initial capital and full
-    /// stop; `None` without either.
-    pub fn misfit(&self) -> Option<String> {
+    /// Whether the motion determines all readouts and offsets.
+    pub(crate) fn is_determined(&self) -> bool {
+        let mut cameras = self.cameras.iter().enumerate();
+        cameras.all(|(index, of)| of.readout_s.is_some() && (index == 0 || of.offset_s.is_some()))
+    }
+
+    /// Sentences about time stamps of another unit or in another order than the frames, and about residuals that the timing does
+    /// not explain, without initial capital and full stop.
+    pub fn warnings(&self) -> Vec<String> {
         let Self { rms_px, corner_sd_px, interval_s, .. } = *self;
-        if interval_s < SHORTEST_S {
-            return Some(format!(
-                "frames every {:.4} ms: check that the time stamps are in nanoseconds",
-                1e3 * interval_s
-            ));
-        }
-        (rms_px > MISFIT * corner_sd_px && corner_sd_px > 0.0).then(|| {
+        let unit = (interval_s < SHORTEST_S).then(|| {
+            let ms = 1e3 * interval_s;
+            format!("frames every {ms:.4} ms: check that the time stamps are in nanoseconds")
+        });
+        let disordered = self.cameras.iter().filter(|of| of.earlier_frames > 0);
+        let order = disordered.map(|CameraTiming { name, earlier_frames, .. }| {
+            let name = if name.is_empty() { String::new() } else { format!("{name}: ") };
+            format!(
+                "{name}time stamps are not in the order of the frames' names; {} before the previous frame: check the time \
+                 stamps",
+                if *earlier_frames == 1 { "1 is".to_owned() } else { format!("{earlier_frames} are") }
+            )
+        });
+        let is_large = rms_px > MISFIT * corner_sd_px && corner_sd_px > 0.0 && unit.is_none();
+        let misfit = is_large.then(|| {
             format!(
                 "residuals of the timing ({rms_px:.3} px) are many times the standard deviation of the corners ({corner_sd_px:.3} px): \
                  check the camera, the target, and whether the time stamps are those of the exposures"
             )
-        })
+        });
+        unit.into_iter().chain(order).chain(misfit).collect()
     }
 }
 
@@ -108,6 +132,8 @@ pub struct CameraTiming {
     pub drift: Option<Measured>,
     /// Number of its frames that were used.
     pub frames: usize,
+    /// Number of its frames with an earlier time stamp than the frame before it, in the order of their names.
+    pub earlier_frames: usize,
 }
 
 /// An estimated value and its standard deviation, observed in the scatter between frames.

@@ -7,11 +7,14 @@ use std::process::ExitCode;
 use anyhow::{Context, ensure};
 
 use crate::deltille::calibrate::sightings::{Sightings, SightingsArgs};
+use crate::deltille::calibrate::solving::print_diagnoses;
 use crate::deltille::files::camera_file;
 use crate::interrupt;
 use crate::output::{self, Overwrite, log};
+use crate::run::FAILED;
 use deltille::calibrate::{
-    CameraEstimate, Contradiction, HandEye, HandEyeRequest, Intrinsics, Model, Mounting, RobotNoise,
+    CameraEstimate, Contradiction, Diagnosis, HandEye, HandEyeRequest, Intrinsics, Messages, Model,
+    Mounting, RobotNoise,
 };
 use deltille::camera::Pose;
 use deltille::export::kind::Kind;
@@ -105,7 +108,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     for out in &found.cameras.excluded {
         log!("{}: excluded: {}", out.view, out.reason);
     }
-    print_warnings(&found);
+    print_warnings(&found)?;
     output::write(&path, hand_eye::write(&found).as_bytes(), args.overwrite)?;
     output::print(
         &(describe(&found) + &format!("wrote {}\n", shown(&path.display().to_string()))),
@@ -113,7 +116,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if interrupt::has_ended_input() {
         return Ok(ExitCode::from(interrupt::exit_code()));
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(match found.diagnoses.iter().any(Diagnosis::is_failure) {
+        true => ExitCode::from(FAILED),
+        false => ExitCode::SUCCESS,
+    })
 }
 
 /// Reads a known camera, with its uncertainties if the file has them.
@@ -135,7 +141,9 @@ fn known(path: &Path) -> anyhow::Result<(CameraEstimate, Vec<TargetIdentity>)> {
     Ok((only.context("no camera")?, before.calibrated_with))
 }
 
-fn print_warnings(found: &HandEye) {
+/// Prints what does not fit on standard error. Fails if the images are not of the given camera.
+fn print_warnings(found: &HandEye) -> anyhow::Result<()> {
+    print_diagnoses(&Messages::new(&found.cameras, None), &found.diagnoses)?;
     for contradiction in &found.contradictions {
         log!(
             "warning: {contradiction} ({})",
@@ -160,6 +168,7 @@ fn print_warnings(found: &HandEye) {
     if found.spare_poses > 0 {
         log!("note: {} without a photograph", counted(found.spare_poses, "pose"));
     }
+    Ok(())
 }
 
 /// Describes the result in a few lines.

@@ -86,7 +86,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(path) = &path {
         output::write(path, timing_file::write(&found).as_bytes(), args.overwrite)?;
     }
-    found.misfit().iter().for_each(|said| log!("warning: {said}"));
+    found.warnings().iter().for_each(|said| log!("warning: {said}"));
     output::print(&compensation::describe(&found))?;
     if let Some(path) = &path {
         output::print(&format!("wrote {}\n", shown(&path.display().to_string())))?;

@@ -90,7 +90,7 @@ pub fn prepare(
     if !others.is_empty() {
         (*calibration, timing) = compensated(&all)?;
     }
-    timing.misfit().iter().for_each(|said| log!("warning: {said}"));
+    timing.warnings().iter().for_each(|said| log!("warning: {said}"));
     Ok(Prepared { tried, timing: Some(timing) })
 }
 

@@ -292,19 +292,23 @@ impl SolveArgs {
     }
 }
 
+/// Prints diagnoses on standard error. Fails if the images were not taken by a fixed camera.
+pub fn print_diagnoses(words: &Messages<'_>, diagnoses: &[Diagnosis]) -> anyhow::Result<()> {
+    for diagnosis in diagnoses {
+        let text = words.sentence(diagnosis);
+        if matches!(diagnosis, Diagnosis::WrongCamera { .. }) {
+            bail!("{text}; nothing was written");
+        }
+        let kind = if diagnosis.is_failure() { "error" } else { "warning" };
+        log!("{kind}: {text}");
+    }
+    Ok(())
+}
+
 impl Calibrated {
     /// Prints the diagnoses on standard error. Fails if the images were not taken by a fixed camera.
     pub fn print_diagnoses(&self) -> anyhow::Result<()> {
-        let words = Messages::new(&self.estimate, self.print.scale);
-        for diagnosis in &self.diagnoses {
-            let text = words.sentence(diagnosis);
-            if matches!(diagnosis, Diagnosis::WrongCamera { .. }) {
-                bail!("{text}; nothing was written");
-            }
-            let kind = if diagnosis.is_failure() { "error" } else { "warning" };
-            log!("{kind}: {text}");
-        }
-        Ok(())
+        print_diagnoses(&Messages::new(&self.estimate, self.print.scale), &self.diagnoses)
     }
 
     /// Returns exit code 1 if the result must not be used unchanged.

@@ -145,7 +145,7 @@ pub(in crate::export) struct ShapeRecord {
 /// A diagnosis of an estimate that is not a finding, with the figures used in its text.
 #[derive(Debug, Default, Serialize)]
 pub(in crate::export) struct DiagnosisRecord<'a> {
-    kind: &'static str,
+    pub(super) kind: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     camera: Option<&'a str>,
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use serde::Serialize;
 
+use super::estimate::diagnoses;
 use super::motion::Motion;
 use deltille_calibrate::{HandEye, HandEyeView, Mounting};
 use deltille_core::camera::Pose;
@@ -61,7 +62,7 @@ struct Noise {
     degrees_of_freedom: Option<[f64; 2]>,
 }
 
-/// A contradiction.
+/// What the photographs contradict of what was stated about the robot, or of the camera and the board.
 #[derive(Serialize)]
 struct Finding {
     kind: &'static str,
@@ -124,11 +125,7 @@ pub fn write(found: &HandEye) -> String {
             translation_mm: found.noise.translation_mm,
             degrees_of_freedom: found.noise_freedom,
         },
-        findings: found
-            .contradictions
-            .iter()
-            .map(|of| Finding { kind: of.name(), text: of.to_string() })
-            .collect(),
+        findings: findings(found),
         rotations: found
             .rotation_spread
             .iter()
@@ -150,6 +147,13 @@ pub fn write(found: &HandEye) -> String {
         calibrated_with: &found.cameras.calibrated_with,
     };
     json::to_text(&file, 3)
+}
+
+fn findings(found: &HandEye) -> Vec<Finding> {
+    let of_robot = found.contradictions.iter();
+    let of_robot = of_robot.map(|of| Finding { kind: of.name(), text: of.to_string() });
+    let of_camera = diagnoses(&found.cameras, &found.diagnoses, None).into_iter();
+    of_robot.chain(of_camera.map(|of| Finding { kind: of.kind, text: of.text })).collect()
 }
 
 fn static_transform(
