@@ -63,6 +63,8 @@ mod _core {
         _located, Comparison, Located, Motion, compare, compare_rigs, pose_of,
     };
     #[pymodule_export]
+    use super::calibrate::joint_covariance::JointCovariance;
+    #[pymodule_export]
     use super::calibrate::keywords::{calibrate, rig};
     #[pymodule_export]
     use super::calibrate::next_view::{NextView, next_view};

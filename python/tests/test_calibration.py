@@ -36,6 +36,18 @@ def test_a_camera_is_calibrated_with_its_uncertainties(calibration, camera, dete
     assert calibration.excluded == [] and all(said.sentence for said in calibration.diagnoses)
 
 
+def test_the_covariance_of_all_unknowns_has_their_names(detections, board, calibration):
+    shared = calibration.joint_covariance
+    assert shared.names[:2] == ["camera.fx", "camera.fy"] and shared.units[:2] == ["px", "px"]
+    numpy.testing.assert_allclose(shared.noise[:8, :8], calibration.covariance, rtol=1e-6)
+    numpy.testing.assert_allclose(shared.observed[:8, :8], calibration.observed_covariance, rtol=1e-6)
+    every = deltille.calibrate(detections, board, covariance_of_all=True).joint_covariance
+    assert len(every.names) == len(shared.names) + 6 * len(calibration.views) == len(every.noise)
+    assert every.names[len(shared.names)].endswith(".rx") and every.units[-1] == "mm"
+    numpy.testing.assert_allclose(every.noise[:8, :8], shared.noise[:8, :8], rtol=1e-6)
+    assert numpy.linalg.eigvalsh(every.noise / numpy.sqrt(numpy.outer(*[numpy.diag(every.noise)] * 2))).min() > 0
+
+
 def test_parameters_are_fixed_equal_or_measured_before(detections, board, camera):
     fx, _, cx, *_ = camera.parameters
     constrained = {"fix": ["k2", "p1=0.001"], "equal": "fx,fy", "prior": f"cx={cx}±0.5"}

@@ -97,9 +97,7 @@ impl Calibration {
             self.check_constraints(camera, first)?;
         }
         let models: Vec<Model> = among.iter().copied().filter(has_all).filter(is_enough).collect();
-        let candidates = self.tried(camera, &models, MAX_VIEWS);
-        let candidates =
-            candidates.map_err(|error| self.alone(camera, &self.panels).with_cause(error))?;
+        let candidates = self.tried(camera, &models, MAX_VIEWS)?;
         let chosen = candidates.iter().find(|candidate| candidate.chosen);
         let model = chosen.map(|chosen| chosen.model).ok_or(CalibrationError::NoStart)?;
         Ok((model, candidates))

@@ -39,10 +39,11 @@ impl Matrix {
         self.0
     }
 
-    /// Whether it is symmetric and positive semidefinite up to rounding errors, after scaling by its diagonal.
+    /// Whether it is symmetric and positive semidefinite up to rounding errors, after scaling by its diagonal; a row without
+    /// variance must be zero.
     pub fn is_covariance(&self) -> bool {
         let n = self.0.nrows();
-        let scale = |i: usize| self.0[(i, i)].sqrt();
+        let scale = |i: usize| if self.0[(i, i)] == 0.0 { 1.0 } else { self.0[(i, i)].sqrt() };
         let of = |i: usize, j: usize| self.0[(i, j)] / (scale(i) * scale(j));
         let is_symmetric = (0..n).all(|i| (0..i).all(|j| (of(i, j) - of(j, i)).abs() < ROUNDED));
         let lifted = DMatrix::from_fn(n, n, |i, j| of(i, j) + if i == j { ROUNDED } else { 0.0 });

@@ -57,7 +57,7 @@ impl Calibration {
     }
 
     /// A failure with what was stated about the cameras and contradicts the images: given intrinsics, or constraints.
-    pub(crate) fn with_cause(&self, error: CalibrationError) -> CalibrationError {
+    fn with_cause(&self, error: CalibrationError) -> CalibrationError {
         if let foreign @ [_, ..] = self.foreign_cameras().as_slice() {
             let names: Vec<&str> = foreign.iter().map(|&c| &*self.cameras[c].name).collect();
             let (cameras, error) = (names.join(", "), Box::new(error));

@@ -39,7 +39,7 @@ pub struct Length {
 /// comments.
 ///
 /// # Errors
-/// Returns an error if a column is missing, a value is not a number in its range, or a length appears twice.
+/// Returns an error if a column is missing or appears twice, or if a value is not a number in its range.
 pub fn parse(text: &str) -> Result<Vec<Length>, Problem> {
     let lines = (1..).zip(text.trim_start_matches('\u{feff}').lines());
     let mut lines = lines.filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
@@ -95,16 +95,6 @@ pub fn parse(text: &str) -> Result<Vec<Length>, Problem> {
         Ok(Length { line, ends, length_mm: mm(length, SHORTEST_MM)?, sd_mm: mm(sd, 0.0)? })
     };
     let found = lines.map(read).collect::<Result<Vec<Length>, Problem>>()?;
-    let is_same = |one: &Length, [a, b]: [(Option<u32>, i32, i32); 2]| {
-        one.ends == [a, b] || one.ends == [b, a]
-    };
-    for (index, of) in found.iter().enumerate() {
-        if let Some(first) = found[..index].iter().find(|first| is_same(first, of.ends)) {
-            let text =
-                format!("the length between these corners is already in line {}", first.line);
-            return Err(Problem { line: of.line, text });
-        }
-    }
     match found.is_empty() {
         true => Err(Problem { line, text: "the table contains no lengths".to_owned() }),
         false => Ok(found),

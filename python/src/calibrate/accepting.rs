@@ -224,6 +224,9 @@ pub fn accept_of(
         }
         _ => return Err(wrong("pass temperature_c and expansion_ppm together".to_owned())),
     };
+    if let Some([again, first]) = KnownLength::repeated(&lengths) {
+        return Err(wrong(format!("lengths: [{again}] is between the same corners as [{first}]")));
+    }
     let request = AcceptanceRequest { lengths, limit, temperature };
     let found = unlocked(py, move || views.accept(&before, &request))?;
     let found = found.map_err(|error| wrong(error.to_string()))?;

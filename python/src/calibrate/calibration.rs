@@ -15,6 +15,7 @@ use numpy::PyArray2;
 use pyo3::prelude::*;
 
 use super::calibrated_camera::CalibratedCamera;
+use super::joint_covariance::JointCovariance;
 use super::pickled::{of_text, pickled, restored};
 use super::solving::Solved;
 use super::views::{Diagnosis, Excluded};
@@ -105,6 +106,12 @@ macro_rules! whole {
                     })
                 });
                 data.map(|data| record(py, &data)).transpose()
+            }
+
+            /// Covariance of all unknowns together; ``None`` if only poses were estimated, or if it was read from a file.
+            #[getter]
+            fn joint_covariance($self: $kind) -> Option<JointCovariance> {
+                $solved.estimate.covariance.clone().map(JointCovariance)
             }
 
             /// Uncertainty (1σ) of the pose of a target that the calibrated camera or rig estimates.

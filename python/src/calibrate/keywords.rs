@@ -43,6 +43,8 @@ use crate::see::detector::sides;
 ///     Robust loss for outliers: ``"huber"``, ``"cauchy"`` or ``"none"`` (least squares).
 /// weights : str, optional
 ///     ``"covariance"`` of the detections, or ``"equal"``.
+/// covariance_of_all : bool, optional
+///     Include the poses of the views, and the offsets of measured corners, in ``joint_covariance``.
 /// board_shape : bool, optional
 ///     Estimate bending and stretching of the sheet, too.
 /// measure_target : bool, optional
@@ -80,7 +82,8 @@ use crate::see::detector::sides;
 #[pyo3(signature = (detections, target = None, model = "radtan", *, camera = None, grid = None, rows = None,
     cols = None, edge_mm = None, hold_out = None, loss = "huber", weights = "covariance", board_shape = false,
     measure_target = false, shape = None, print_scale = None, distances_mm = None, names = None,
-    assume_target = false, board_accuracy_mm = None, fix = None, equal = None, prior = None))]
+    assume_target = false, board_accuracy_mm = None, fix = None, equal = None, prior = None,
+    covariance_of_all = false))]
 #[expect(clippy::too_many_arguments, reason = "keywords")]
 pub fn calibrate(
     py: Python<'_>,
@@ -106,10 +109,11 @@ pub fn calibrate(
     fix: Option<Texts>,
     equal: Option<Texts>,
     prior: Option<Texts>,
+    covariance_of_all: bool,
 ) -> PyResult<Py<Calibration>> {
     let mut how = How::of(loss, weights, hold_out, distances_mm, print_scale, board_accuracy_mm)?;
     (how.board_shape, how.measure_target) = (board_shape, measure_target);
-    how.assume_target = assume_target;
+    (how.assume_target, how.covariance_of_all) = (assume_target, covariance_of_all);
     how.constraints = constraints(fix, equal, prior)?;
     let target = target.or_else(|| of_detections(&detections.all, grid.is_some()));
     let seen = Seen::of(target, grid, sides(rows, cols)?, edge_mm)?;
@@ -152,7 +156,7 @@ pub fn of_detections(detections: &[PyRef<'_, Detection>], is_grid: bool) -> Opti
 /// refine_target : bool, optional
 ///     Estimate the poses of the panels on the target, too.
 /// hold_out, loss, weights, board_shape, measure_target, print_scale, distances_mm, assume_target,
-/// board_accuracy_mm
+/// board_accuracy_mm, covariance_of_all
 ///     See :func:`calibrate`.
 ///
 /// Returns
@@ -166,7 +170,8 @@ pub fn of_detections(detections: &[PyRef<'_, Detection>], is_grid: bool) -> Opti
 #[pyfunction]
 #[pyo3(signature = (cameras, target = None, model = "radtan", *, known = None, refine_target = false,
     hold_out = None, loss = "huber", weights = "covariance", board_shape = false, measure_target = false,
-    print_scale = None, distances_mm = None, assume_target = false, board_accuracy_mm = None))]
+    print_scale = None, distances_mm = None, assume_target = false, board_accuracy_mm = None,
+    covariance_of_all = false))]
 #[expect(clippy::too_many_arguments, reason = "keywords")]
 pub fn rig(
     py: Python<'_>,
@@ -184,11 +189,12 @@ pub fn rig(
     distances_mm: Option<Vec<f64>>,
     assume_target: bool,
     board_accuracy_mm: Option<f64>,
+    covariance_of_all: bool,
 ) -> PyResult<Rig> {
     let wrong = |what: String| Err(raised::CalibrationError::new_err(what));
     let mut how = How::of(loss, weights, hold_out, distances_mm, print_scale, board_accuracy_mm)?;
     (how.board_shape, how.measure_target) = (board_shape, measure_target);
-    how.assume_target = assume_target;
+    (how.assume_target, how.covariance_of_all) = (assume_target, covariance_of_all);
     how.refine_target = refine_target;
     if cameras.len()? < 2 && !refine_target {
         return wrong(

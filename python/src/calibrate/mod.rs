@@ -5,7 +5,8 @@
 //!
 //! 1. `keywords` contains the functions `calibrate` and `rig`.
 //! 2. `solving` checks their arguments, and solves.
-//! 3. `calibration` is the result, `calibrated_camera` one of its cameras, `views` its views and diagnoses.
+//! 3. `calibration` is the result, `calibrated_camera` one of its cameras, `views` its views and diagnoses,
+//!    `joint_covariance` the covariance of all unknowns.
 //! 4. `pickled` restores each of these after pickling.
 //! 5. `next_view` proposes the next view.
 //! 6. `comparison` tests whether two calibrations differ, and estimates the pose of a target.
@@ -19,6 +20,7 @@ pub mod calibrated_camera;
 pub mod calibration;
 pub mod checking;
 pub mod comparison;
+pub mod joint_covariance;
 pub mod keywords;
 pub mod next_view;
 mod pickled;

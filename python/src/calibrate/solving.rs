@@ -107,6 +107,7 @@ pub struct How {
     pub distances_mm: Vec<f64>,
     pub board_accuracy_mm: Option<f64>,
     pub assume_target: bool,
+    pub covariance_of_all: bool,
     pub constraints: Vec<Constraint>,
     pub sheet: Sheet,
 }
@@ -159,6 +160,7 @@ impl How {
             distances_mm,
             board_accuracy_mm: accuracy_mm.transpose()?,
             assume_target: false,
+            covariance_of_all: false,
             constraints: Vec::new(),
             sheet: Sheet { print_scale, ..Sheet::default() },
         })
@@ -465,6 +467,7 @@ pub fn solve(
             .measure_target(how.measure_target)
             .refine_panels(how.refine_target)
             .distances_mm(how.distances_mm)
+            .covariance_of_all(how.covariance_of_all)
             .hold_out(how.hold_out)
             .cancelled_by(stop.clone());
         if let Some(mm) = how.board_accuracy_mm {

@@ -1,5 +1,7 @@
 //! What an acceptance test compares with.
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 
 use crate::input::panel::PanelRef;
@@ -150,6 +152,13 @@ impl KnownLength {
             true => Ok(Self { ends, length_mm, sd_mm }),
             false => Err(RequestError::Length { length_mm, described_mm }),
         }
+    }
+
+    /// The index of the first length between the same corners as an earlier one, and the index of that one.
+    pub fn repeated(all: &[Self]) -> Option<[usize; 2]> {
+        let mut seen = BTreeMap::new();
+        let mut all = all.iter().map(|Self { ends: [a, b], .. }| (a.min(b), a.max(b))).enumerate();
+        all.find_map(|(index, ends)| Some([index, seen.insert(ends, index)?]))
     }
 }
 

@@ -142,8 +142,16 @@ fn known_lengths(
     };
     let lengths =
         known_lengths::parse(&text).map_err(|problem| anyhow!(problem).context(show()))?;
+    let lines: Vec<usize> = lengths.iter().map(|length| length.line).collect();
     let lengths: anyhow::Result<Vec<KnownLength>> = lengths.into_iter().map(of).collect();
-    lengths.with_context(show)
+    let lengths = lengths.with_context(show)?;
+    if let Some(repeated) = KnownLength::repeated(&lengths) {
+        let [line, first] = repeated.map(|index| lines[index]);
+        let what =
+            format!("line {line}: the length between these corners is already in line {first}");
+        return Err(anyhow!(what).context(show()));
+    }
+    Ok(lengths)
 }
 
 /// How a limit is written.

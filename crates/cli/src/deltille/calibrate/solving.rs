@@ -161,6 +161,7 @@ impl ModelChoice {
             {
                 error.into()
             }
+            CalibrationError::WrongConstraints { .. } => error.into(),
             _ => anyhow!(error).context(AUTO),
         })?;
         calibration.set_intrinsics(camera, model);

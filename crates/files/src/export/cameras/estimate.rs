@@ -212,7 +212,7 @@ pub(in crate::export) struct DiagnosisRecord<'a> {
     /// A smaller lens model that fits as well.
     #[serde(skip_serializing_if = "Option::is_none")]
     sufficient: Option<String>,
-    text: String,
+    pub(super) text: String,
 }
 
 pub(in crate::export) fn parameters(camera: &CameraEstimate) -> Vec<ParameterRecord<'_>> {

@@ -8,6 +8,7 @@ use deltille_calibrate::{SHAPE_COEFFICIENTS as COUNT, Shape};
 use deltille_core::json;
 use deltille_core::json::ReadError;
 use deltille_core::quantity;
+use deltille_core::reading::in_words;
 use deltille_core::setting::Setting::{CalibrationBoardShape, CalibrationWrite, RigWrite};
 use deltille_core::targets::{TargetIdentity, check_result_of};
 use deltille_layout::SheetLayout;
@@ -32,6 +33,9 @@ pub enum SheetError {
         "not a calibration written by {CalibrationWrite} or {RigWrite}: calibrate with {CalibrationBoardShape}"
     )]
     Foreign,
+    /// The text is not complete.
+    #[error("{0}")]
+    Incomplete(String),
     /// A field is missing or has an invalid value.
     #[error("field `{field}`: {problem}; calibrate again with {CalibrationBoardShape}")]
     Field {
@@ -86,7 +90,7 @@ pub fn read_sheet(text: &str, targets: &[TargetIdentity]) -> Result<Sheet, Sheet
         return Err(SheetError::Foreign);
     }
     let file: SheetOfFile = json::read(text).map_err(|error| match error {
-        ReadError::Json(_) => SheetError::Foreign,
+        ReadError::Json(problem) => SheetError::Incomplete(in_words(&problem)),
         ReadError::Field { field, problem } => SheetError::Field { field, problem },
     })?;
     check_result_of(&file.calibrated_with, targets).map_err(SheetError::OtherTarget)?;

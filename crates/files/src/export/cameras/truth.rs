@@ -9,6 +9,7 @@ use deltille_core::camera::Pose;
 use deltille_core::json;
 use deltille_core::json::ReadError;
 use deltille_core::quantity;
+use deltille_core::reading::in_words;
 use deltille_layout::synth::{Light, TruthCorner};
 
 /// Schema and version that this crate writes.
@@ -37,6 +38,9 @@ pub enum TruthError {
     /// The file is not a ground truth.
     #[error("not the ground truth of a synthetic photograph")]
     Foreign,
+    /// The text is not complete.
+    #[error("{0}")]
+    Incomplete(String),
     /// A field is missing or has an invalid value.
     #[error("field `{field}`: {problem}")]
     Field {
@@ -108,7 +112,7 @@ pub fn read(text: &str) -> Result<Truth, TruthError> {
         return Err(TruthError::Foreign);
     }
     let found: SavedTruth = json::read(text).map_err(|error| match error {
-        ReadError::Json(_) => TruthError::Foreign,
+        ReadError::Json(problem) => TruthError::Incomplete(in_words(&problem)),
         ReadError::Field { field, problem } => TruthError::Field { field, problem },
     })?;
     let SavedTruth { image, target, camera_from_target, blur_px, noise, gradient, seed, corners } =

@@ -238,6 +238,13 @@ fn of_correlations(rows: &[Vec<f64>], sds: &[f64]) -> Option<Matrix> {
     (has_units && correlations.is_covariance()).then(|| covariance_of(rows, sds))?
 }
 
+const WRONG_BOARD: &str = "`board_covariance` must be the lower triangle of a positive semidefinite matrix, with a row for each parameter";
+
+/// The covariance matrix of this lower triangle; `None` if an element is missing, or impossible.
+fn triangle(rows: &[Vec<f64>], n: usize) -> Option<Matrix> {
+    covariance_of(rows, &vec![1.0; n]).filter(Matrix::is_covariance)
+}
+
 /// The matrix of these rows, scaled by standard deviations; `None` if an element is missing.
 fn covariance_of(rows: &[Vec<f64>], sds: &[f64]) -> Option<Matrix> {
     let n = sds.len();
@@ -262,10 +269,7 @@ impl SavedProjection {
             let covariance = covariance.ok_or(
                 "`observed_correlations` must be positive definite, with one for each pair of parameters",
             )?;
-            let of_board = board.map(|rows| {
-                covariance_of(&rows, &vec![1.0; found])
-                    .ok_or("`board_covariance` must have a number for each pair of parameters")
-            });
+            let of_board = board.map(|rows| triangle(&rows, found).ok_or(WRONG_BOARD));
             Ok(ObservedCovariance { covariance, of_board: of_board.transpose()?, freedom })
         });
         Ok(ProjectionUncertainty::new(alignment, distances_mm, observed.transpose()?))
@@ -276,12 +280,12 @@ impl SavedJoint {
     fn read(self) -> Result<ObservedCovariance, &'static str> {
         let Self { covariance, freedom, board_covariance } = self;
         let n = covariance.len();
-        let matrix = |rows: &[Vec<f64>]| {
-            covariance_of(rows, &vec![1.0; n]).ok_or("the matrices must be lower triangles")
-        };
+        let of_board = board_covariance.map(|rows| triangle(&rows, n).ok_or(WRONG_BOARD));
         Ok(ObservedCovariance {
-            covariance: matrix(&covariance)?,
-            of_board: board_covariance.as_deref().map(matrix).transpose()?,
+            covariance: triangle(&covariance, n).ok_or(
+                "`covariance` must be the lower triangle of a positive semidefinite matrix",
+            )?,
+            of_board: of_board.transpose()?,
             freedom,
         })
     }
