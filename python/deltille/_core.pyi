@@ -55,6 +55,7 @@ __all__ = [
     "Grid",
     "HandEye",
     "Icosahedron",
+    "JointCovariance",
     "Located",
     "Motion",
     "NextView",

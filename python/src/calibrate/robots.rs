@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use deltille::calibrate::{
-    self, Calibration, CalibrationError, CameraEstimate, Diagnosis, HandEyeError, HandEyeRequest,
-    Intrinsics, Messages, Mounting, RobotNoise, RobotPose, RobotPoses, RobotRotation, views,
+    self, Calibration, CalibrationError, CameraEstimate, HandEyeError, HandEyeRequest, Intrinsics,
+    Messages, Mounting, RobotNoise, RobotPose, RobotPoses, RobotRotation, views,
 };
 use deltille::export::hand_eye;
 use deltille::limits::Limits;
@@ -254,16 +254,12 @@ pub fn hand_eye_of(
     let calibration = Calibration::of(&reference, panels).camera("camera", views, intrinsics);
     let request = HandEyeRequest { robot, mounting, noise, scale, earlier };
     let found = unlocked(py, move || calibration.hand_eye(&request, &given))?;
-    let found = found.map_err(|error| match error {
+    found.map(HandEye).map_err(|error| match error {
         HandEyeError::Calibration(error) => {
             Err::<(), CalibrationError>(error).raise(errors::calibration).unwrap_err()
         }
         error => wrong(error.to_string()),
-    })?;
-    match found.diagnoses.iter().find(|said| matches!(said, Diagnosis::WrongCamera { .. })) {
-        Some(foreign) => Err(wrong(Messages::new(&found.cameras, None).sentence(foreign))),
-        None => Ok(HandEye(found)),
-    }
+    })
 }
 
 /// The poses of a robot; those of a sequence name their detections, so that some may be missing.

@@ -17,6 +17,9 @@ pub enum HandEyeError {
     /// The camera or the poses of the board could not be estimated.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
+    /// The given camera did not take the photographs.
+    #[error("{0}")]
+    WrongCamera(String),
     /// Poses and photographs that cannot be paired.
     #[error("cannot pair the robot's poses with the photographs: {0}")]
     Pairing(String),

@@ -8,6 +8,9 @@ use super::pairing::Pairing;
 use super::readings::{self, Paired, Start};
 use super::request::HandEyeRequest;
 use crate::adjust::reweighting::{Settled, variance};
+use crate::diagnose::diagnosis::Diagnosis;
+use crate::diagnose::messages::Messages;
+use crate::diagnose::model_selection::Alternative;
 use crate::equations::minimise::{Minimum, Until, minimise};
 use crate::error::CalibrationError;
 use crate::estimate::values::CameraEstimate;
@@ -51,6 +54,15 @@ impl Calibration {
             return Err(CalibrationError::Stopped.into());
         }
         estimate.calibrated_with.clone_from(&self.identities);
+        let diagnoses = self.explain(&estimate);
+        let wrong_camera = diagnoses.iter().find(|of| blames_camera(of));
+        let wrong_camera = wrong_camera.map(|of| {
+            let sentence = Messages::new(&estimate, None).sentence(of);
+            (matches!(of, Diagnosis::WrongCamera { .. }), HandEyeError::WrongCamera(sentence))
+        });
+        if let Some((true, error)) = wrong_camera {
+            return Err(error);
+        }
         let Settled { minimum, whitening, .. } = settled;
         let variance = variance(&minimum, &whitening, self.loss);
         let of_frame = |frame: &crate::FrameEstimate| pairing.poses.get(&frame.name).copied();
@@ -86,8 +98,10 @@ impl Calibration {
             asked.robot.are_inverse,
         )
         .map_err(|error| {
-            match check_rotations(paired.iter().map(|&(_, pose)| to_base(pose).rotation)) {
-                Err(_) if matches!(error, HandEyeError::NoAgreement { .. }) => HandEyeError::Still,
+            let turned = paired.iter().map(|&(_, pose)| to_base(pose).rotation);
+            match (&error, check_rotations(turned), wrong_camera) {
+                (HandEyeError::NoAgreement { .. }, Err(_), _) => HandEyeError::Still,
+                (HandEyeError::NoAgreement { .. }, _, Some((_, camera))) => camera,
                 _ => error,
             }
         })?;
@@ -96,7 +110,6 @@ impl Calibration {
         let joint = adjusted(problem, &whitening, self, asked.noise, &measured)?;
         let covariance = joint.covariance(variance).ok_or(HandEyeError::Undetermined)?;
         let contradictions = contradictions(&joint, &whitening, self, asked, &measured);
-        let diagnoses = self.explain(&estimate);
         let problem = &joint.minimum.problem;
         let robot = problem.robot.as_ref().ok_or(HandEyeError::Undetermined)?;
         let names = || estimate.frames.iter().map(|frame| frame.name.clone());
@@ -124,6 +137,15 @@ impl Calibration {
             spare_poses: asked.robot.poses.len() - pairing.poses.len(),
             cameras: estimate,
         })
+    }
+}
+
+/// Whether a diagnosis says that the given camera did not take the photographs.
+fn blames_camera(said: &Diagnosis) -> bool {
+    match said {
+        Diagnosis::WrongCamera { .. } => true,
+        Diagnosis::Remedied { remedy, .. } => remedy.alternative == Alternative::Camera,
+        _ => false,
     }
 }
 

@@ -422,6 +422,22 @@ mod tests {
         assert!(of(&["k1=-0.15"]).iter().all(|of| !of.contains("constraint")));
     }
 
+    /// Constraints with which no view fits.
+    #[test]
+    fn constraints_that_prevent_a_calibration_are_named() {
+        let views = views(&mut ChaCha8Rng::seed_from_u64(6));
+        let failed = |model: Model, constraints: &[&str]| {
+            let constraints = constraints.iter().map(|of| Constraint::fixed(of).unwrap()).collect();
+            let camera = CameraViews { constraints, ..CameraViews::new("c", views.clone(), model) };
+            let calibration = Calibration::new([Pose::IDENTITY]).with(camera);
+            calibration.solve().unwrap_err().to_string()
+        };
+        let said = failed(Model::Radtan, &["k1=1000000000"]);
+        assert!(said.starts_with("the constraints (k1=1000000000) contradict the views"), "{said}");
+        let said = failed(Model::Radtan, &["k9"]);
+        assert!(said.contains("no parameter k9") && !said.contains("contradict"), "{said}");
+    }
+
     /// Over many calibrations with a new measurement each, errors agree with the standard deviations, both those from
     /// noise and those observed.
     #[test]

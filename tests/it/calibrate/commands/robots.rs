@@ -1,7 +1,7 @@
 //! `deltille handeye`: the mountings on a robot, and poses that cannot be used.
 
-use super::{board, camera, done, folder, json, refused, seen_whole};
-use deltille::camera::Pose;
+use super::{board, camera, done, folder, json, output, refused, seen_whole};
+use deltille::camera::{Camera, Pose};
 use deltille::export::detection;
 use glam::{DQuat, DVec3};
 use rand::{Rng, SeedableRng};
@@ -134,6 +134,25 @@ fn poses_that_cannot_be_used_are_refused() {
     let few: Vec<&str> = table.lines().take(3).collect();
     said(&few.join("\n"), "only 2 photographs have a pose of the robot");
     said(&table.replace(".png", "-a.png"), "the poses are for 00-a.png, 01-a.png");
+}
+
+#[test]
+fn another_camera_is_named() {
+    let folder = folder(&board(8, 9), &[]);
+    let at = folder.path();
+    simulated(at, false);
+    let run = |name: &str, camera: Camera| {
+        std::fs::write(at.join(name), camera.to_yaml()).unwrap();
+        output(at, &format!("{HAND_EYE} --camera {name}"))
+    };
+    let right = run("right.yaml", camera());
+    let said = String::from_utf8(right.stderr).unwrap();
+    assert!(right.status.success() && !said.contains("warning"), "{said}");
+    assert_eq!(json(&at.join("handeye.json"))["findings"], serde_json::json!([]));
+    let other = run("other.yaml", Camera { focal_px: camera().focal_px * 1.01, ..camera() });
+    let said = String::from_utf8(other.stderr).unwrap();
+    assert!(said.contains("warning: estimating the intrinsics lowers the residuals"), "{said}");
+    assert_eq!(json(&at.join("handeye.json"))["findings"][0]["kind"], "remedy");
 }
 
 #[test]

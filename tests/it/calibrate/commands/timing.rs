@@ -1,6 +1,6 @@
 //! `deltille timing`: the clocks of a rig, and recordings that cannot be used.
 
-use super::{board, camera, done, folder, json, refused, seen_whole};
+use super::{board, camera, done, folder, json, output, refused, seen_whole};
 use deltille::camera::Pose;
 use deltille::export::detection;
 use deltille::targets::Target;
@@ -68,6 +68,16 @@ fn the_offset_of_a_camera_is_measured() {
     write(at, &target, "short", 12, [30.0, OFFSET_S]);
     refused(at, &format!("{timing} {}", of("short")), &["only 12 frames of left have neighbours"]);
     refused(at, &format!("{timing} absent.mp4"), &["absent.mp4: No such file"]);
+
+    for index in 0..240 {
+        let path = at.join(format!("waved/right/{index:03}.json"));
+        let mut found = json(&path);
+        found["time_ns"] = (-found["time_ns"].as_i64().unwrap()).into();
+        std::fs::write(path, found.to_string()).unwrap();
+    }
+    let disordered = output(at, &format!("{timing} {}", of("waved")));
+    let said = String::from_utf8(disordered.stderr).unwrap();
+    assert!(said.contains("right: time stamps are not in the order"), "{said}");
 }
 
 /// A rig that is calibrated from a moving target only, and recordings that do not suffice.

@@ -108,7 +108,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     for out in &found.cameras.excluded {
         log!("{}: excluded: {}", out.view, out.reason);
     }
-    print_warnings(&found)?;
+    print_warnings(&found);
     output::write(&path, hand_eye::write(&found).as_bytes(), args.overwrite)?;
     output::print(
         &(describe(&found) + &format!("wrote {}\n", shown(&path.display().to_string()))),
@@ -141,9 +141,8 @@ fn known(path: &Path) -> anyhow::Result<(CameraEstimate, Vec<TargetIdentity>)> {
     Ok((only.context("no camera")?, before.calibrated_with))
 }
 
-/// Prints what does not fit on standard error. Fails if the images are not of the given camera.
-fn print_warnings(found: &HandEye) -> anyhow::Result<()> {
-    print_diagnoses(&Messages::new(&found.cameras, None), &found.diagnoses)?;
+fn print_warnings(found: &HandEye) {
+    print_diagnoses(&Messages::new(&found.cameras, None), &found.diagnoses);
     for contradiction in &found.contradictions {
         log!(
             "warning: {contradiction} ({})",
@@ -168,7 +167,6 @@ fn print_warnings(found: &HandEye) -> anyhow::Result<()> {
     if found.spare_poses > 0 {
         log!("note: {} without a photograph", counted(found.spare_poses, "pose"));
     }
-    Ok(())
 }
 
 /// Describes the result in a few lines.

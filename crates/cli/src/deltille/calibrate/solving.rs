@@ -293,23 +293,24 @@ impl SolveArgs {
     }
 }
 
-/// Prints diagnoses on standard error. Fails if the images were not taken by a fixed camera.
-pub fn print_diagnoses(words: &Messages<'_>, diagnoses: &[Diagnosis]) -> anyhow::Result<()> {
+/// Prints diagnoses on standard error.
+pub fn print_diagnoses(words: &Messages<'_>, diagnoses: &[Diagnosis]) {
     for diagnosis in diagnoses {
-        let text = words.sentence(diagnosis);
-        if matches!(diagnosis, Diagnosis::WrongCamera { .. }) {
-            bail!("{text}; nothing was written");
-        }
         let kind = if diagnosis.is_failure() { "error" } else { "warning" };
-        log!("{kind}: {text}");
+        log!("{kind}: {}", words.sentence(diagnosis));
     }
-    Ok(())
 }
 
 impl Calibrated {
     /// Prints the diagnoses on standard error. Fails if the images were not taken by a fixed camera.
     pub fn print_diagnoses(&self) -> anyhow::Result<()> {
-        print_diagnoses(&Messages::new(&self.estimate, self.print.scale), &self.diagnoses)
+        let words = Messages::new(&self.estimate, self.print.scale);
+        let is_foreign = |said: &&Diagnosis| matches!(said, Diagnosis::WrongCamera { .. });
+        if let Some(foreign) = self.diagnoses.iter().find(is_foreign) {
+            bail!("{}; nothing was written", words.sentence(foreign));
+        }
+        print_diagnoses(&words, &self.diagnoses);
+        Ok(())
     }
 
     /// Returns exit code 1 if the result must not be used unchanged.
