@@ -102,7 +102,8 @@ class Scene:
     height: int = 960
     focal_px: float = 900.0
     tilt_deg: float = 30.0
-    edge_px: float = 0.0  # of a tile in the middle before the tilt; 0: the board fills 75 % of the picture
+    edge_px: float = 0.0  # of a tile in the middle before the tilt; 0: the board fills this part of the picture
+    fill: float = 0.75
     blur_px: float = 0.7
     motion_px: float = 0.0
     black: float = 0.05
@@ -147,7 +148,7 @@ class View:
             seen = self.project(corners)
             low, high = seen.min(0), seen.max(0)
             if not scene.edge_px:
-                self.translation[2] *= 1 + 0.5 * (((high - low) / (0.75 * picture)).max() - 1)
+                self.translation[2] *= 1 + 0.5 * (((high - low) / (scene.fill * picture)).max() - 1)
             off = (picture - 1) / 2 + aside - (high + low) / 2
             self.translation[:2] += 0.9 * off * self.translation[2] / scene.focal_px
         self.px_per_mm = scene.focal_px / self.translation[2]
@@ -218,15 +219,29 @@ def moved(image, length_px, angle):
     return cv2.filter2D(image, -1, kernel, borderType=cv2.BORDER_REPLICATE)
 
 
-def demosaiced(light, noise, tone, rng):
-    """Grey values from a Bayer sensor whose filters transmit different fractions of the light."""
+def coloured(light, noise, tone, rng, method=cv2.COLOR_BayerBG2BGR_EA):
+    """A colour image from a Bayer sensor whose filters transmit different fractions of the light."""
     gains = np.array([0.7, 1.0, 0.6])
     raw = light.copy()
     raw[0::2, 0::2] *= gains[0]
     raw[1::2, 1::2] *= gains[2]
     raw = np.clip(raw + rng.normal(0, noise, raw.shape), 0, 1)
-    rgb = cv2.demosaicing((raw * 65535).round().astype(np.uint16), cv2.COLOR_BayerBG2RGB) / 65535
-    return tone_curve(tone, rgb / gains) @ [0.299, 0.587, 0.114]
+    bgr = cv2.demosaicing((raw * 65535).round().astype(np.uint16), method) / 65535
+    return tone_curve(tone, bgr / gains[::-1])
+
+
+def demosaiced(light, noise, tone, rng):
+    """Grey values of the same sensor, with planes interpolated bilinearly."""
+    return coloured(light, noise, tone, rng, cv2.COLOR_BayerBG2BGR) @ [0.114, 0.587, 0.299]
+
+
+def lit(light, truth, ratio, rng):
+    """Light that falls off across the board by a ratio."""
+    height, width = light.shape
+    angle = rng.uniform(0, 2 * np.pi)
+    y, x = np.mgrid[0:height, 0:width]
+    off = (x - width / 2) * math.cos(angle) + (y - height / 2) * math.sin(angle)
+    return light * ratio ** -(off / np.ptp(truth, 0).max() + 0.5).clip(-0.3, 1.3)
 
 
 def photograph(page, scene, seed):
@@ -236,10 +251,7 @@ def photograph(page, scene, seed):
     truth = view.project(page.corners_mm)
     light = look(page, view, scene)
     if scene.light_ratio != 1:
-        angle = rng.uniform(0, 2 * np.pi)
-        y, x = np.mgrid[0 : scene.height, 0 : scene.width]
-        off = (x - scene.width / 2) * math.cos(angle) + (y - scene.height / 2) * math.sin(angle)
-        light *= scene.light_ratio ** -(off / np.ptp(truth, 0).max() + 0.5).clip(-0.3, 1.3)
+        light = lit(light, truth, scene.light_ratio, rng)
     if scene.motion_px:
         light = moved(light, scene.motion_px, rng.uniform(0, np.pi))
     light = light * scene.exposure

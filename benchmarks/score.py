@@ -1,0 +1,129 @@
+"""Scores detections of the benchmark's photographs. Needs Python and numpy only.
+
+    python score.py FOLDER/charuco/truth.json mine.json
+
+The file of a detector:
+
+    {"detector": "mine", "version": "1.0", "board": "charuco",
+     "photographs": {"usual-0": {"corners": [{"label": {"id": 12}, "x": 310.2, "y": 207.9, "covariance": null}],
+                                 "cpu_s": 0.004, "px": 691200}}}
+
+The centre of the upper left pixel is (0, 0). A label is `{"id": …}` as in the description of the board, or, for a board without
+codes, `{"row": …, "col": …}` in any frame of the lattice. `covariance` is `[xx, xy, yy]` in px², or null. `cpu_s`, `px` and
+`memory_mb` are optional. Photographs that are absent count as without corners.
+
+For each scene and for all together:
+
+    found     corners within 0.3 of the distance to their nearest neighbour, over those that are visible
+    wrong     corners elsewhere, or that do not exist
+    rms       RMS error per axis of the found corners, px; median: of their distance from the truth
+    bound     RMS of errors over the Cramér–Rao bound of each corner; scenes without a bound (colour, JPEG) do not count
+    e²/σ²     mean squared error over the stated variance, per axis; 1 if it is right
+    ms/Mpx    CPU time, median and largest
+"""
+
+import json
+import math
+import pathlib
+import sys
+from collections import Counter
+
+import numpy as np
+
+WRONG = 0.3
+
+
+def labelled(truth, corners):
+    """Pairs of a found corner and the truth of its label; None if there is no such label."""
+    if all("id" in corner["label"] for corner in corners):
+        by_id = {of["label"]["id"]: of for of in truth}
+        return [(corner, by_id.get(corner["label"]["id"])) for corner in corners]
+    return aligned(truth, corners)
+
+
+TURNS = [np.array(turn) for turn in (
+    [[1, 0], [0, 1]], [[0, 1], [-1, 0]], [[-1, 0], [0, -1]], [[0, -1], [1, 0]],
+    [[1, 0], [0, -1]], [[-1, 0], [0, 1]], [[0, 1], [1, 0]], [[0, -1], [-1, 0]],
+)]
+
+
+def aligned(truth, corners):
+    """The same for labels in any frame of the lattice: that turn and shift in which most labels are right."""
+    places = np.array([[of["x"], of["y"]] for of in truth])
+    lattice = np.array([[of["label"]["row"], of["label"]["col"]] for of in truth])
+    own = np.array([[of["label"]["row"], of["label"]["col"]] for of in corners])
+    seen = np.array([[of["x"], of["y"]] for of in corners])
+    nearest = np.linalg.norm(seen[:, None] - places[None], axis=2).argmin(1)
+    votes = Counter()
+    for index, turn in enumerate(TURNS):
+        votes.update((index, *shift) for shift in (lattice[nearest] - own @ turn.T).tolist())
+    index, *shift = votes.most_common(1)[0][0]
+    by_place = {tuple(at): of for at, of in zip(lattice.tolist(), truth)}
+    labels = own @ TURNS[index].T + shift
+    return [(corner, by_place.get(tuple(label))) for corner, label in zip(corners, labels.tolist())]
+
+
+def judged(truth, corners):
+    """What one photograph contributes: corners due, found and wrong; errors, shares of bounds and of stated variances."""
+    of = {"due": sum(corner["visible"] for corner in truth), "wrong": 0, "errors": [], "over_bound": [], "over_stated": []}
+    for corner, at in labelled(truth, corners) if corners else []:
+        error = np.array([corner["x"] - at["x"], corner["y"] - at["y"]]) if at else np.array([np.inf, np.inf])
+        if not math.hypot(*error) < WRONG * (at["nearest_px"] if at else 1):
+            of["wrong"] += 1
+            continue
+        if not at["visible"]:
+            continue
+        of["errors"].append(error.tolist())
+        for covariance, shares in ((at["bound"], of["over_bound"]), (corner.get("covariance"), of["over_stated"])):
+            if covariance:
+                xx, xy, yy = covariance
+                shares.append(float(error @ np.linalg.solve([[xx, xy], [xy, yy]], error)) / 2)
+    return of
+
+
+def summed(parts):
+    """Figures of some photographs: what `judged` returned, with their files' entries."""
+    due, wrong = (sum(part[key] for part, _ in parts) for key in ("due", "wrong"))
+    errors = np.array([error for part, _ in parts for error in part["errors"]]).reshape(-1, 2)
+    mean = lambda key: np.mean(shares) if (shares := [share for part, _ in parts for share in part[key]]) else None
+    times = [1e9 * of["cpu_s"] / of["px"] for _, of in parts if of and of.get("cpu_s") is not None]
+    bound = mean("over_bound")
+    return {
+        "due": due,
+        "found": len(errors),
+        "wrong": wrong,
+        "rms_px": float(np.sqrt(np.mean(errors**2))) if len(errors) else None,
+        "median_px": float(np.median(np.hypot(*errors.T))) if len(errors) else None,
+        "over_bound": float(np.sqrt(bound)) if bound is not None else None,
+        "over_stated": None if mean("over_stated") is None else float(mean("over_stated")),
+        "ms_per_mpx": float(np.median(times)) if times else None,
+        "worst_ms_per_mpx": float(np.max(times)) if times else None,
+    }
+
+
+def score(truth, result):
+    """The figures of a detector: of all photographs, and by scene."""
+    parts = {}
+    for name, photograph in truth["photographs"].items():
+        found = result["photographs"].get(name, {})
+        part = (judged(photograph["corners"], found.get("corners", [])), found)
+        parts.setdefault(photograph["scene"], []).append(part)
+    every = [part for of in parts.values() for part in of]
+    return {"all": summed(every), "scenes": {scene: summed(of) for scene, of in parts.items()}}
+
+
+def shown(figures):
+    number = lambda value, places: "–" if value is None else f"{value:.{places}f}"
+    return (
+        f"{figures['found']:6} of {figures['due']:6}  {figures['wrong']:5}  {number(figures['rms_px'], 4):>8}  "
+        f"{number(figures['median_px'], 4):>8}  {number(figures['over_bound'], 2):>6}  {number(figures['over_stated'], 2):>6}  "
+        f"{number(figures['ms_per_mpx'], 1):>7}  {number(figures['worst_ms_per_mpx'], 1):>7}"
+    )
+
+
+if __name__ == "__main__":
+    truth, result = (json.loads(pathlib.Path(path).read_text()) for path in sys.argv[1:3])
+    figures = score(truth, result)
+    print(f"{'scene':14}  {'found':>16}  wrong  {'rms px':>8}  {'median':>8}  bound  {'e²/σ²':>7}  {'ms/Mpx':>7}  {'worst':>7}")
+    for scene, of in (*figures["scenes"].items(), ("all", figures["all"])):
+        print(f"{scene:14}  {shown(of)}")
