@@ -140,7 +140,7 @@ def one(folder, board, scene, seed):
     for number in range(protocol.VIEWS):
         name = f"{slug(scene)}-{number}"
         image, corners = shoot(page, protocol.SCENES[scene], [seed, number, *scene.encode()])
-        cv2.imwrite(str(folder / board / f"{name}.png"), image)
+        cv2.imwrite(str(folder / board / f"{name}.png"), image, [cv2.IMWRITE_PNG_COMPRESSION, 9])
         found.append((name, {"scene": scene, "corners": corners}))
     return found
 

@@ -209,11 +209,20 @@ pub fn accept_of(
     };
     let lengths =
         lengths.into_iter().flatten().map(length).collect::<PyResult<Vec<KnownLength>>>()?;
-    let is_positive = |value: f64| value.is_finite() && value > 0.0;
-    if limit_mm.is_some_and(|mm| !is_positive(mm))
-        || !(limit_per_length == 0.0 || is_positive(limit_per_length))
-    {
-        return Err(wrong("limit_mm, limit_per_length: expected positive numbers".to_owned()));
+    if has_table && lengths.is_empty() {
+        return Err(wrong("lengths: the list is empty".to_owned()));
+    }
+    if limit_mm.is_some_and(|mm| !(mm.is_finite() && mm > 0.0)) {
+        return Err(wrong("limit_mm: expected a positive number".to_owned()));
+    }
+    if limit_mm.is_none() && limit_per_length != 0.0 {
+        return Err(wrong("limit_per_length: pass limit_mm, too".to_owned()));
+    }
+    // The reciprocal, L/5000 as 5000, would accept everything.
+    if !(0.0..1.0).contains(&limit_per_length) {
+        return Err(wrong(
+            "limit_per_length: expected mm of error per mm of length, such as 1/5000".to_owned(),
+        ));
     }
     let limit = limit_mm.map(|constant_mm| Limit { constant_mm, per_length: limit_per_length });
     let temperature = match (temperature_c, expansion_ppm) {

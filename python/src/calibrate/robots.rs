@@ -101,7 +101,8 @@ impl HandEye {
     fn findings(&self) -> Vec<String> {
         let words = Messages::new(&self.0.cameras, None);
         let of_robot = self.0.contradictions.iter().map(ToString::to_string);
-        of_robot.chain(self.0.diagnoses.iter().map(|said| words.sentence(said))).collect()
+        let of_camera = self.0.diagnoses.iter().map(|said| words.sentence(said));
+        of_robot.chain(of_camera).chain(self.0.few_views()).collect()
     }
 
     /// The camera, with its parameters after the adjustment.

@@ -34,7 +34,8 @@ impl CameraTiming {
         &self.0.name
     }
 
-    /// Time from the exposure of the first row to that of the last, s; positive if the upper rows are exposed first.
+    /// Time in which all rows are exposed one after the other, s: the number of rows times the line delay. Positive if the upper
+    /// rows are exposed first.
     #[getter]
     fn readout_s(&self) -> Value {
         value(self.0.readout_s)

@@ -66,9 +66,10 @@ pub struct AcceptanceRequest {
 /// wrong.
 const DIFFERENT: f64 = 0.02;
 
-/// Ranges of temperatures, °C, and of coefficients of expansion, ppm/K, of usable targets.
+/// Ranges of temperatures, °C, and of coefficients of expansion, ppm/K, of usable targets; the smallest are those of glass
+/// ceramics. A target may also not expand at all.
 const CELSIUS: [f64; 2] = [-60.0, 200.0];
-const PPM_PER_K: [f64; 2] = [0.0, 300.0];
+const PPM_PER_K: [f64; 2] = [0.001, 300.0];
 
 /// What is wrong with a request.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -101,7 +102,10 @@ pub enum RequestError {
     #[error("{0} °C is not a temperature from {low} to {high} °C", low = CELSIUS[0], high = CELSIUS[1])]
     Temperature(f64),
     /// A coefficient of expansion is out of its range.
-    #[error("{0} ppm/K is not from {low} to {high} ppm/K", low = PPM_PER_K[0], high = PPM_PER_K[1])]
+    #[error(
+        "{0} ppm/K is neither 0 nor from {low} to {high} ppm/K (23e-6/K is 23 ppm/K)",
+        low = PPM_PER_K[0], high = PPM_PER_K[1]
+    )]
     Expansion(f64),
 }
 
@@ -184,7 +188,8 @@ impl Temperature {
         if !is_within(celsius, CELSIUS) {
             return Err(RequestError::Temperature(celsius.0));
         }
-        if !is_within(ppm_per_k, PPM_PER_K) {
+        let expands = ppm_per_k.0 != 0.0 || ppm_per_k.1 != 0.0;
+        if expands && !is_within(ppm_per_k, PPM_PER_K) {
             return Err(RequestError::Expansion(ppm_per_k.0));
         }
         Ok(Self {

@@ -25,9 +25,6 @@ const POOR_RMS_PX: f64 = 1.0;
 /// Fraction of the views that a calibration may exclude.
 const MAX_EXCLUDED: f64 = 0.2;
 
-/// Deviation of a prior from the views, in standard deviations, that is not due to chance.
-const WRONG_PRIOR_SIGMA: f64 = 4.0;
-
 /// Minimum difference between the focal lengths of two minima, in standard deviations.
 const APART_SIGMA: f64 = 10.0;
 const NEARLY: f64 = 1.5;
@@ -144,13 +141,13 @@ pub enum Diagnosis {
         /// RMS residual per axis without outliers, px.
         rms_px: f64,
     },
-    /// A prior of a parameter that the views contradict.
-    WrongPrior {
+    /// A constraint that the views contradict.
+    WrongConstraint {
         /// The camera.
         camera: usize,
-        /// Name of the parameter.
-        parameter: String,
-        /// Difference between the prior and the value from the views alone, in standard deviations of this difference.
+        /// The constraint.
+        constraint: Constraint,
+        /// Difference between the constraint and the estimate without it, in standard deviations of this difference.
         deviations: f64,
     },
     /// Parameters that the views do not distinguish.
@@ -175,6 +172,15 @@ impl Diagnosis {
                 | Self::ManyPanelsExcluded { .. }
                 | Self::ChangedCamera { .. }
         )
+    }
+
+    /// Whether it says that a given camera did not take the images.
+    pub(crate) fn blames_camera(&self) -> bool {
+        match self {
+            Self::WrongCamera { .. } => true,
+            Self::Remedied { remedy, .. } => remedy.alternative == Alternative::Camera,
+            _ => false,
+        }
     }
 
     /// The camera whose lens the model does not fit according to this diagnosis, so that no view is to blame for its
@@ -222,6 +228,9 @@ impl Calibration {
         if own.is_single() {
             said.iter_mut().for_each(|said| own.refine(found, said));
         }
+        // Everything else may be due to a wrong constraint.
+        let failures = said.iter().take_while(|said| said.is_failure()).count();
+        said.splice(failures..failures, own.contradicted_constraints(found));
         said.extend(own.open_labels());
         if let (true, Some((other, rms_px))) = (own.is_single(), own.second_minimum(found)) {
             said.push(Diagnosis::SecondMinimum { camera: 0, other, rms_px });
@@ -355,35 +364,7 @@ fn said(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
     };
     let gross = gross.filter(|said| !is_of_lens(said));
     let before = failures.into_iter().chain(late).chain(states);
-    let priors = cameras().flat_map(|(camera, of)| wrong_priors(camera, of));
-    before.chain(ends).chain(gross).chain(causes).chain(priors).chain(open).collect()
-}
-
-/// The priors of a camera that its views contradict: the estimate is far from the prior, or the views alone are.
-///
-/// With the prior m ± d, the value x from the views alone and the estimate, x − m is (estimate − m) / (1 − k), where
-/// k = (σ / d)² is the weight of the prior; its variance is d² + σₓ².
-fn wrong_priors(camera: usize, of: &CameraEstimate) -> Vec<Diagnosis> {
-    let found = of.parameters.iter().zip(of.observed_sd());
-    let wrong = found.filter_map(|(found, observed)| {
-        let (value, sd) = of.constraints.iter().find_map(|one| match one {
-            Constraint::Prior { parameter, value, sd } if *parameter == found.name => {
-                Some((*value, *sd))
-            }
-            _ => None,
-        })?;
-        let noise = found.sd?;
-        let observed = observed.unwrap_or(noise).max(noise);
-        let variance = sd * sd - 2.0 * noise * noise + observed * observed;
-        let off = (found.value - value).abs();
-        let deviations = (off / sd).max(off / variance.max(f64::MIN_POSITIVE).sqrt());
-        (deviations > WRONG_PRIOR_SIGMA).then(|| Diagnosis::WrongPrior {
-            camera,
-            parameter: found.name.clone(),
-            deviations,
-        })
-    });
-    wrong.collect()
+    before.chain(ends).chain(gross).chain(causes).chain(open).collect()
 }
 
 /// The diagnoses of changed cameras, rolling shutters and stretched boards.

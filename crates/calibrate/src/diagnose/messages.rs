@@ -94,12 +94,12 @@ impl<'a> Messages<'a> {
                     format!("residuals are {rms_px:.1} px RMS: {cause}{lens}, or the labels are wrong");
                 self.of_camera(*camera, text)
             }
-            Diagnosis::WrongPrior { camera, parameter, deviations } => self.of_camera(
+            Diagnosis::WrongConstraint { camera, constraint, deviations } => self.of_camera(
                 *camera,
                 format!(
-                    "the prior of {parameter} differs from its value in the views by {deviations:.1} standard \
-                     deviations: the measurement or its standard deviation is wrong, or the lens or the board does not fit \
-                     its description"
+                    "the views contradict the constraint {constraint}: without it, the estimate differs by {deviations:.1} \
+                     standard deviations; the value or its standard deviation is wrong, or the lens or the board does not \
+                     fit its description"
                 ),
             ),
             Diagnosis::IllConditioned { camera, parameters, sufficient } => {

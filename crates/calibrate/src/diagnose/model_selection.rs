@@ -79,6 +79,9 @@ pub(super) type Alone = Option<(Calibration, Estimate)>;
 /// its additional parameters.
 const EXCLUDED_VIEWS: usize = 2;
 
+/// Number of coefficients of a lens, k1 and k2, that are estimated instead of none.
+const PLAIN_COEFFICIENTS: usize = 2;
+
 impl Calibration {
     /// This calibration of one camera with other views.
     pub(crate) fn of_views(&self, views: Vec<View>) -> Self {
@@ -185,9 +188,13 @@ impl Calibration {
 
     /// The same if the camera was given: either it is another camera, or the board is bent.
     fn remedy_of_known(&self, camera: &Camera, found: &Estimate) -> Option<Remedy> {
-        let values = camera.parameters().into_iter().enumerate();
-        let of_lens = |(i, value): (usize, f64)| i < PROJECTION_PARAMETERS.len() || value != 0.0;
-        let near = Intrinsics::Near { camera: camera.clone(), free: values.map(of_lens).collect() };
+        let values = camera.parameters();
+        let of_lens = PROJECTION_PARAMETERS.len();
+        // Without any distortion, it is not known which coefficients the lens has.
+        let is_plain = values.iter().skip(of_lens).all(|value| *value == 0.0);
+        let least = if is_plain { of_lens + PLAIN_COEFFICIENTS } else { of_lens };
+        let free = values.iter().enumerate().map(|(i, value)| i < least || *value != 0.0);
+        let near = Intrinsics::Near { camera: camera.clone(), free: free.collect() };
         let bent = (self.panels.len() == 1).then(|| self.clone().board_shape(true).adjusted().ok());
         let bent = bent.flatten().map(|other| (Alternative::Shape, other));
         let other = self.of_intrinsics(near).board_shape(false).adjusted().ok();

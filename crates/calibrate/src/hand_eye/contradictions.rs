@@ -47,12 +47,12 @@ impl fmt::Display for Contradiction {
             Self::Scale { scale, sd } => write!(
                 f,
                 "the robot's translations fit the board better if they are multiplied by {scale:.5} ± {sd:.5}: check the \
-                 unit of the poses and the size of the board, or estimate the scale"
+                 unit of the poses, the size of the board and the focal length of the camera, or estimate the scale"
             ),
             Self::Noise { estimated } => write!(
                 f,
-                "the given noise of the robot does not explain the residuals, which suggest {:.4}° and {:.3} mm: correct \
-                 the noise, or let it be estimated",
+                "the given noise of the robot differs significantly from that of the residuals, {:.4}° and {:.3} mm: correct \
+                 it, or let it be estimated",
                 estimated.rotation_rad.to_degrees(),
                 estimated.translation_mm
             ),

@@ -89,12 +89,35 @@ pub enum HandEyeError {
         /// The same with the poses in a wrong order.
         shuffled_mm: f64,
     },
-    /// The given noise is impossible, or so small that the poses contradict each other.
+    /// The given noise is impossible.
     #[error(
-        "the poses of the robot contradict each other by far more than the given noise explains, or it is not between 0.0001° \
-         and 57° and between 0.001 mm and 1000 mm: state a larger one, or let it be estimated"
+        "the noise of the robot must be between 0.0001° and 57°, and between 0.001 mm and 1000 mm"
+    )]
+    NoiseRange,
+    /// The given noise is so small that the poses contradict each other.
+    #[error(
+        "the poses of the robot contradict each other by far more than the given noise explains: state a larger one, or let \
+         it be estimated"
     )]
     Noise,
+    /// Poses that are wrong, without which the others do not determine the mountings.
+    #[error(
+        "the robot's poses contradict each other, and the {agreeing} that agree do not rotate about two axes: take 15 or more \
+         photographs, each with the flange rotated differently"
+    )]
+    Contradictory {
+        /// Number of poses that agree.
+        agreeing: usize,
+    },
+    /// Translations that fit only with a factor far from 1.
+    #[error(
+        "the robot's translations fit the board only if they are multiplied by {scale:.3}: check the unit of the poses and \
+         the size of the board"
+    )]
+    Unit {
+        /// The factor.
+        scale: f64,
+    },
     /// The equations have no solution.
     #[error("the poses do not determine the mountings: rotate the flange more, about two axes")]
     Undetermined,

@@ -10,6 +10,10 @@ use crate::input::robot::{Mounting, RobotNoise};
 use crate::matrix::Matrix;
 use deltille_core::camera::Pose;
 
+/// Number of views among which a wrong pose is recognised: two relative motions determine the mountings, and two others have to
+/// contradict it.
+const RECOGNISABLE: usize = 5;
+
 /// The mountings of a camera and a board on a robot.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -82,6 +86,21 @@ impl HandEye {
     /// Standard deviation of the scale, if it was estimated.
     pub fn scale_sd(&self) -> Option<f64> {
         (self.covariance.rows() > 12).then(|| self.covariance[(12, 12)].sqrt())
+    }
+
+    /// A warning if the views are too few to recognise a wrong pose, without initial capital and full stop.
+    pub fn few_views(&self) -> Option<String> {
+        let used = self.used().count();
+        (used < RECOGNISABLE).then(|| {
+            format!(
+                "with {used} views, a wrong pose of the robot may not be recognised; use 15 or more"
+            )
+        })
+    }
+
+    /// Whether the photographs show that the given camera did not take them. Poses that seem wrong may then be right.
+    pub fn blames_camera(&self) -> bool {
+        self.diagnoses.iter().any(Diagnosis::blames_camera)
     }
 
     /// The views whose poses were used.

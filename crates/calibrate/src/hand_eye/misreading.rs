@@ -24,6 +24,10 @@ pub enum Misreading {
     Metres,
     /// Translations are in millimetres, not metres.
     Millimetres,
+    /// Translations are in centimetres.
+    Centimetres,
+    /// Translations are in inches.
+    Inches,
     /// This axis of the translations has the opposite sign.
     Mirrored(char),
 }
@@ -46,6 +50,8 @@ impl Misreading {
             Self::Transposed => "as if the rotation matrices were transposed",
             Self::Metres => "as if the translations were in metres",
             Self::Millimetres => "as if the translations were in millimetres",
+            Self::Centimetres => "as if the translations were in centimetres",
+            Self::Inches => "as if the translations were in inches",
             Self::Mirrored(axis) => {
                 return format!("as if {axis} of the translations had the opposite sign");
             }
@@ -73,6 +79,7 @@ impl Misreading {
             Self::Transposed => "write matrices by rows".to_owned(),
             Self::Metres => "name the columns _m, or multiply them by 1000".to_owned(),
             Self::Millimetres => "name the columns _mm, or divide them by 1000".to_owned(),
+            Self::Centimetres | Self::Inches => "convert them to millimetres".to_owned(),
             Self::Mirrored(_) => "use right-handed axes for translations and rotations".to_owned(),
         }
     }

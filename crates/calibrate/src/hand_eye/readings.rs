@@ -103,10 +103,21 @@ impl Fit {
     }
 }
 
+/// Units of translations that were stated in millimetres or metres, and their factors.
+const UNITS: [(Misreading, f64); 6] = [
+    (Misreading::Metres, 1000.0),
+    (Misreading::Millimetres, 0.001),
+    (Misreading::Centimetres, 10.0),
+    (Misreading::Centimetres, 0.01),
+    (Misreading::Inches, 25.4),
+    (Misreading::Inches, 0.0254),
+];
+
 /// A reading of poses.
 struct Reading {
     is_inverted: bool,
-    length: Option<Misreading>,
+    /// Another unit of the translations, and its factor.
+    length: Option<(Misreading, f64)>,
     rotation: Option<OtherRotation>,
     /// The axis of the translations whose sign is wrong, and its name.
     mirrored: Option<(DVec3, char)>,
@@ -120,7 +131,7 @@ impl Reading {
         let rotations = [None].into_iter().chain(other_rotations(notation).iter().map(Some));
         let mut all = Vec::new();
         for rotation in rotations {
-            for length in [None, Some(Misreading::Metres), Some(Misreading::Millimetres)] {
+            for length in [None].into_iter().chain(UNITS.map(Some)) {
                 for is_inverted in [false, true] {
                     all.push(Self {
                         is_inverted,
@@ -141,16 +152,13 @@ impl Reading {
         let inverted = self.is_inverted.then_some(Misreading::Inverted);
         let rotation = self.rotation.map(|(misreading, _)| misreading);
         let mirrored = self.mirrored.map(|(_, name)| Misreading::Mirrored(name));
-        rotation.into_iter().chain(self.length).chain(inverted).chain(mirrored).collect()
+        let length = self.length.map(|(misreading, _)| misreading);
+        rotation.into_iter().chain(length).chain(inverted).chain(mirrored).collect()
     }
 
     /// The pose in this reading.
     fn of(&self, robot: &RobotPose) -> RobotPose {
-        let scale = match self.length {
-            Some(Misreading::Metres) => 1000.0,
-            Some(Misreading::Millimetres) => 0.001,
-            _ => 1.0,
-        };
+        let scale = self.length.map_or(1.0, |(_, factor)| factor);
         let signs = self.mirrored.map_or(DVec3::ONE, |(axis, _)| DVec3::ONE - 2.0 * axis);
         RobotPose {
             translation_mm: robot.translation_mm * scale * signs,
@@ -283,6 +291,8 @@ mod tests {
             assert_eq!(differences(&degrees), [Misreading::Degrees]);
             let metres = |p: &Pose| (p.translation / 1000.0, quaternion(p));
             assert_eq!(differences(&metres), [Misreading::Metres]);
+            let inches = |p: &Pose| (p.translation / 25.4, quaternion(p));
+            assert_eq!(differences(&inches), [Misreading::Inches]);
             let both = |p: &Pose| (p.inverse().translation / 1000.0, quaternion(&p.inverse()));
             assert_eq!(differences(&both), [Misreading::Metres, Misreading::Inverted]);
             // Each pose with the photograph of another.

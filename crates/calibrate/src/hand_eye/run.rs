@@ -10,7 +10,6 @@ use super::request::HandEyeRequest;
 use crate::adjust::reweighting::{Settled, variance};
 use crate::diagnose::diagnosis::Diagnosis;
 use crate::diagnose::messages::Messages;
-use crate::diagnose::model_selection::Alternative;
 use crate::equations::minimise::{Minimum, Until, minimise};
 use crate::error::CalibrationError;
 use crate::estimate::values::CameraEstimate;
@@ -29,6 +28,9 @@ use deltille_core::camera::{Lens, Pose};
 /// five to ten.
 const MAX_ROUNDS: usize = 30;
 
+/// Factors of translations that a wrong size of the board may cause; others are wrong units.
+const ORDINARY_SCALES: std::ops::Range<f64> = 0.5..2.0;
+
 impl Calibration {
     /// Estimates where the camera and the board are mounted on a robot, jointly with the poses of the board, the intrinsics
     /// and the noise of the robot. `detections` are those of all photographs, also without a target, in the order of the
@@ -45,7 +47,7 @@ impl Calibration {
         detections: impl IntoIterator<Item = impl Into<Named<'a>>>,
     ) -> Result<HandEye, HandEyeError> {
         if asked.noise.is_some_and(|noise| !noise.is_valid()) {
-            return Err(HandEyeError::Noise);
+            return Err(HandEyeError::NoiseRange);
         }
         let photographs: Vec<Named<'_>> = detections.into_iter().map(Into::into).collect();
         let pairing = Pairing::of(&asked.robot, &photographs)?;
@@ -55,7 +57,7 @@ impl Calibration {
         }
         estimate.calibrated_with.clone_from(&self.identities);
         let diagnoses = self.explain(&estimate);
-        let wrong_camera = diagnoses.iter().find(|of| blames_camera(of));
+        let wrong_camera = diagnoses.iter().find(|of| of.blames_camera());
         let wrong_camera = wrong_camera.map(|of| {
             let sentence = Messages::new(&estimate, None).sentence(of);
             (matches!(of, Diagnosis::WrongCamera { .. }), HandEyeError::WrongCamera(sentence))
@@ -108,8 +110,19 @@ impl Calibration {
         let measured: Vec<Option<Pose>> = indices.iter().map(|pose| pose.map(to_base)).collect();
         let problem = with_robot(minimum.problem, asked, start, &measured, variance);
         let joint = adjusted(problem, &whitening, self, asked.noise, &measured)?;
+        let agreeing = used_poses(&joint.minimum.problem);
+        if check_rotations(agreeing.iter().map(|pose| pose.rotation)).is_err() {
+            return Err(HandEyeError::Contradictory { agreeing: agreeing.len() });
+        }
         let covariance = joint.covariance(variance).ok_or(HandEyeError::Undetermined)?;
         let contradictions = contradictions(&joint, &whitening, self, asked, &measured);
+        for contradiction in &contradictions {
+            if let Contradiction::Scale { scale, .. } = *contradiction
+                && !ORDINARY_SCALES.contains(&scale)
+            {
+                return Err(HandEyeError::Unit { scale });
+            }
+        }
         let problem = &joint.minimum.problem;
         let robot = problem.robot.as_ref().ok_or(HandEyeError::Undetermined)?;
         let names = || estimate.frames.iter().map(|frame| frame.name.clone());
@@ -137,15 +150,6 @@ impl Calibration {
             spare_poses: asked.robot.poses.len() - pairing.poses.len(),
             cameras: estimate,
         })
-    }
-}
-
-/// Whether a diagnosis says that the given camera did not take the photographs.
-fn blames_camera(said: &Diagnosis) -> bool {
-    match said {
-        Diagnosis::WrongCamera { .. } => true,
-        Diagnosis::Remedied { remedy, .. } => remedy.alternative == Alternative::Camera,
-        _ => false,
     }
 }
 
@@ -303,6 +307,11 @@ fn adjusted(
     }
     let minimum = minimum.ok_or(HandEyeError::Undetermined)?;
     Ok(Joint { minimum, components })
+}
+
+/// The poses of the robot that were used.
+fn used_poses(problem: &Problem) -> Vec<Pose> {
+    problem.robot.iter().flat_map(|robot| robot.poses.iter().copied().flatten()).collect()
 }
 
 /// The frames with a pose of the robot.

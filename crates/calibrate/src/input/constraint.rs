@@ -400,7 +400,10 @@ mod tests {
         let views = views(&mut ChaCha8Rng::seed_from_u64(5));
         let of = |constraints: &[&str]| {
             let camera = CameraViews::new("c", views.clone(), Model::Radtan5);
-            let constraints = constraints.iter().map(|of| Constraint::fixed(of).unwrap());
+            let constraints = constraints.iter().map(|of| match of.contains('±') {
+                true => Constraint::prior(of).unwrap(),
+                false => Constraint::fixed(of).or_else(|_| Constraint::equal(of)).unwrap(),
+            });
             let camera = CameraViews { constraints: constraints.collect(), ..camera };
             let calibration =
                 Calibration::new([Pose::IDENTITY]).board_accuracy_mm(Some(0.0)).with(camera);
@@ -419,7 +422,16 @@ mod tests {
                 "{wrong:?}: {said:?}"
             );
         }
-        assert!(of(&["k1=-0.15"]).iter().all(|of| !of.contains("constraint")));
+        for contradicted in ["fx=1003", "cx,cy", "cx=645±0.1", "cx=645±0.0001"] {
+            let said = of(&[contradicted]);
+            let named = format!("the views contradict the constraint {contradicted}");
+            assert!(said.iter().any(|of| of.starts_with(&named)), "{contradicted}: {said:?}");
+        }
+        let fx = format!("fx={}", truth().focal_px.x);
+        for right in ["k1=-0.15", "k1=-0.15±1e-9", &fx, &format!("{fx}±0.0001")] {
+            let said = of(&[right]);
+            assert!(said.iter().all(|of| !of.contains("constraint")), "{right}: {said:?}");
+        }
     }
 
     /// Constraints with which no view fits.

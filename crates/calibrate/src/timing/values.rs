@@ -74,8 +74,8 @@ pub struct Timing {
 /// few.
 const MISFIT: f64 = 10.0;
 
-/// Shorter intervals of frames are beyond cameras that take whole images.
-const SHORTEST_S: f64 = 1e-4;
+/// Shorter intervals of frames are beyond cameras that take whole images; with longer ones, no motion is smooth.
+const INTERVALS_S: std::ops::Range<f64> = 1e-4..10.0;
 
 impl Timing {
     /// Whether the motion determines all readouts and offsets.
@@ -88,7 +88,7 @@ impl Timing {
     /// not explain, without initial capital and full stop.
     pub fn warnings(&self) -> Vec<String> {
         let Self { rms_px, corner_sd_px, interval_s, .. } = *self;
-        let unit = (interval_s < SHORTEST_S).then(|| {
+        let unit = (!INTERVALS_S.contains(&interval_s)).then(|| {
             let ms = 1e3 * interval_s;
             format!("frames every {ms:.4} ms: check that the time stamps are in nanoseconds")
         });
@@ -118,10 +118,10 @@ impl Timing {
 pub struct CameraTiming {
     /// Name of the camera.
     pub name: String,
-    /// Time from the exposure of the first row to that of the last, s; positive if the upper rows are exposed first. `None` if
-    /// the motion does not determine it.
+    /// The time in which all rows are exposed one after the other, s: the number of rows times the line delay. Positive if the
+    /// upper rows are exposed first; `None` if the motion does not determine it.
     pub readout_s: Option<Measured>,
-    /// Height of the image, px: the line delay is the readout divided by it.
+    /// Height of the image, px.
     pub height: u32,
     /// Largest displacement of a corner by the readout, between the first and the last row, px.
     pub shear_px: f64,

@@ -166,9 +166,8 @@ impl Topic {
     fn of(diagnosis: &Diagnosis) -> Self {
         match diagnosis {
             Diagnosis::NonMonotonicLens { camera, .. } => Self::Lens(*camera),
-            Diagnosis::WrongPrior { camera, .. } | Diagnosis::IllConditioned { camera, .. } => {
-                Self::Parameters(*camera)
-            }
+            Diagnosis::WrongConstraint { camera, .. }
+            | Diagnosis::IllConditioned { camera, .. } => Self::Parameters(*camera),
             Diagnosis::CommonOutliers(_) => Self::Errors,
             Diagnosis::Remedied { .. }
             | Diagnosis::LackOfFit(_)

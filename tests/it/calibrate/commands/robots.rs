@@ -178,4 +178,11 @@ fn a_scale_and_a_noise_that_the_photographs_contradict_are_named() {
     std::fs::write(at.join("poses.csv"), table).unwrap();
     assert_eq!(kinds(""), ["scale"]);
     assert!(kinds("--scale").is_empty());
+    let mut table = HEADER.to_owned();
+    for (index, pose) in poses.iter().enumerate() {
+        let scaled = Pose { translation: pose.translation / 3.0, ..*pose };
+        table += &line(&format!("{index:02}"), &scaled);
+    }
+    std::fs::write(at.join("poses.csv"), table).unwrap();
+    refused(at, HAND_EYE, &["only if they are multiplied by 3.0"]);
 }

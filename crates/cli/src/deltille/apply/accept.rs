@@ -223,7 +223,10 @@ fn describe(found: &Acceptance) -> String {
         None => counted(all, "length"),
     };
     let (which, limit) = match found.request.limit {
-        Some(limit) => ("decisive", format!(", limit {:.d$} mm", limit.of(first.known_mm))),
+        Some(limit) => {
+            let mm = limit.of(first.known_mm);
+            ("decisive", format!(", limit {mm:.*} mm", d.max(places(mm)).min(6)))
+        }
         None => ("largest", String::new()),
     };
     let ([from, to], budget) = (first.ends.map(|end| corner(&end)), &first.budget);

@@ -152,14 +152,21 @@ fn print_warnings(found: &HandEye) {
             }
         );
     }
-    for view in found.wrong() {
-        log!(
-            "warning: {}: the robot's pose is {:.2}° and {:.2} mm off; not used",
-            view.name,
-            view.rotation_rad.length().to_degrees(),
-            view.translation_mm.length()
-        );
+    let wrong: Vec<_> = found.wrong().collect();
+    if found.blames_camera() && !wrong.is_empty() {
+        let count = counted(wrong.len(), "pose");
+        log!("warning: {count} of the robot not used, which may fit the right camera");
+    } else {
+        for view in wrong {
+            log!(
+                "warning: {}: the robot's pose is {:.2}° and {:.2} mm off; not used",
+                view.name,
+                view.rotation_rad.length().to_degrees(),
+                view.translation_mm.length()
+            );
+        }
     }
+    found.few_views().iter().for_each(|said| log!("warning: {said}"));
     if !found.unpaired.is_empty() {
         let (count, first) = (counted(found.unpaired.len(), "photograph"), &found.unpaired[0]);
         log!("warning: {count} without a pose of the robot, such as {first}");

@@ -532,10 +532,10 @@ pub(in crate::export) fn diagnoses<'a>(
                 rms_px: Some(*rms_px),
                 ..text
             },
-            Diagnosis::WrongPrior { camera, parameter, deviations } => DiagnosisRecord {
-                kind: "wrong_prior",
+            Diagnosis::WrongConstraint { camera, constraint, deviations } => DiagnosisRecord {
+                kind: "wrong_constraint",
                 camera: name(*camera),
-                parameters: std::slice::from_ref(parameter),
+                parameters: constraint.parameters(),
                 deviations: Some(*deviations),
                 ..text
             },

@@ -1,0 +1,133 @@
+"""The same ChArUco board from several generators: does the page have the stated size, and are its corners in place?
+
+    python prints.py path/to/deltille FOLDER    # writes FOLDER/prints.json
+
+Each page is drawn by two programs at 600 dpi where its format allows it. OpenCV finds the corners on the page; a similarity with
+separate scales along both axes is fitted to their nominal positions, and what remains are errors of single corners. An image
+without a format for printing is measured at the resolution for which it was requested.
+"""
+
+import json
+import pathlib
+import subprocess
+import sys
+
+import cv2
+import numpy as np
+
+import protocol
+
+DPI = 600
+IMAGE_DPI = 300
+COLUMNS, ROWS, SQUARE_MM, MARKER_MM = 12, 9, 20.0, 15.0
+
+
+def pages_of_deltille(deltille, folder):
+    command = [deltille, *protocol.BOARDS["charuco"].split(), "--pdf", "--svg", "--name", "ours", "-o", folder, "--force"]
+    subprocess.run([str(part) for part in command], check=True, capture_output=True)
+    yield "PDF, poppler", *by_poppler(folder / "ours.pdf")
+    yield "PDF, pdfium", *by_pdfium(folder / "ours.pdf")
+    yield "SVG, cairo", *by_cairo(folder / "ours.svg")
+    yield "SVG, Chromium", *by_chromium(folder / "ours.svg")
+
+
+def pages_of_opencv(_, folder):
+    board = board_of_opencv()
+    size = [round(count * SQUARE_MM * IMAGE_DPI / 25.4) for count in (COLUMNS, ROWS)]
+    yield f"image, {IMAGE_DPI} dpi", board.generateImage(size, marginSize=0), IMAGE_DPI
+
+
+def pages_of_calib_targets(_, folder):
+    import calib_targets as ct
+
+    page = ct.PageSpec(size=ct.PageSize.custom(width_mm=297.0, height_mm=210.0), margin_mm=10.0)
+    document = ct.charuco_document(
+        rows=ROWS, cols=COLUMNS, square_size_mm=SQUARE_MM, marker_size_rel=MARKER_MM / SQUARE_MM, dictionary="DICT_4X4_100",
+        page=page, render=ct.RenderOptions(png_dpi=IMAGE_DPI),
+    )
+    written = ct.write_target_bundle(document, str(folder / "calib-targets"))
+    yield "SVG, cairo", *by_cairo(pathlib.Path(written.svg_path))
+    yield "SVG, Chromium", *by_chromium(pathlib.Path(written.svg_path))
+    yield f"image, {IMAGE_DPI} dpi", cv2.imread(str(written.png_path), cv2.IMREAD_GRAYSCALE), IMAGE_DPI
+
+
+GENERATORS = {"deltille": pages_of_deltille, "OpenCV CharucoBoard": pages_of_opencv, "calib-targets": pages_of_calib_targets}
+
+
+def by_poppler(path):
+    drawn = path.with_suffix("")
+    # pdftoppm would move edges to a grid of a quarter of a pixel.
+    subprocess.run(["pdftocairo", "-r", str(DPI), "-gray", "-png", "-singlefile", path, drawn], check=True)
+    return cv2.imread(f"{drawn}.png", cv2.IMREAD_GRAYSCALE), DPI
+
+
+def by_pdfium(path):
+    import pypdfium2
+
+    page = pypdfium2.PdfDocument(str(path))[0]
+    return page.render(scale=DPI / 72, grayscale=True).to_numpy().squeeze(), DPI
+
+
+def by_cairo(path):
+    import cairosvg
+
+    png = path.with_suffix(".cairo.png")
+    # Lengths in mm become pixels at 96 dpi, which are then scaled.
+    cairosvg.svg2png(url=str(path), write_to=str(png), scale=DPI / 96, background_color="white")
+    return cv2.imread(str(png), cv2.IMREAD_GRAYSCALE), DPI
+
+
+def by_chromium(path):
+    """The page as Chromium prints it to PDF, drawn by poppler."""
+    pdf = path.with_suffix(".chromium.pdf")
+    text = path.read_text()
+    page = path.with_suffix(".html")
+    page.write_text(f"<style>@page {{ size: 297mm 210mm; margin: 0 }} body {{ margin: 0 }} svg {{ display: block }}</style>{text[text.index('<svg'):]}")
+    flags = ["--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer", f"--print-to-pdf={pdf}"]
+    subprocess.run(["chromium", *flags, page.as_uri()], check=True, capture_output=True)
+    return by_poppler(pdf)
+
+
+def board_of_opencv():
+    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_100)
+    return cv2.aruco.CharucoBoard((COLUMNS, ROWS), SQUARE_MM, MARKER_MM, dictionary)
+
+
+def measured(image, dpi):
+    """Scales along both axes (ppm from 1), RMS and largest error of corners (µm), and the numbers of corners and markers."""
+    board = board_of_opencv()
+    parameters = cv2.aruco.DetectorParameters()
+    parameters.adaptiveThreshWinSizeMax = 153
+    # Markers are several hundred pixels wide.
+    padded = cv2.copyMakeBorder(image, 100, 100, 100, 100, cv2.BORDER_CONSTANT, value=255)
+    corners, ids, _, markers = cv2.aruco.CharucoDetector(board, cv2.aruco.CharucoParameters(), parameters).detectBoard(padded)
+    if ids is None:
+        return {"corners": 0, "markers": 0}
+    criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 100, 1e-5)
+    places = cv2.cornerSubPix(padded, corners.astype(np.float32), (15, 15), (-1, -1), criteria).reshape(-1, 2) - 100
+    page_mm = (places + 0.5) * 25.4 / dpi
+    nominal = np.array(board.getChessboardCorners())[np.ravel(ids), :2]
+    design = np.c_[nominal, np.ones(len(nominal))]
+    fit, *_ = np.linalg.lstsq(design, page_mm, rcond=None)
+    scales = np.linalg.norm(fit[:2], axis=1)
+    off = 1e3 * (page_mm - design @ fit)
+    return {
+        "scale_ppm": [float(1e6 * (scale - 1)) for scale in scales],
+        "rms_um": float(np.sqrt(np.mean(off**2))), "largest_um": float(np.hypot(*off.T).max()),
+        "corners": len(ids), "markers": len(markers),
+    }
+
+
+def main(deltille, folder):
+    made = folder / "prints"
+    made.mkdir(parents=True, exist_ok=True)
+    table = {}
+    for name, pages in GENERATORS.items():
+        for way, image, dpi in pages(deltille, made):
+            table[f"{name}: {way}"] = measured(image, dpi)
+            print(name, way, table[f"{name}: {way}"], flush=True)
+    (folder / "prints.json").write_text(json.dumps(table))
+
+
+if __name__ == "__main__":
+    main(*(pathlib.Path(path).resolve() for path in sys.argv[1:3]))

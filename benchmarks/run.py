@@ -1,0 +1,69 @@
+"""deltille beside other detectors, calibrators and generators: installs them, makes the data, measures, and prints tables.
+
+    python benchmarks/run.py FOLDER                # everything: about an hour on two cores
+    python benchmarks/run.py FOLDER --scene usual "tilt 60°" --board charuco
+    python benchmarks/run.py FOLDER --write        # also into docs/benchmarks.md, its plot and results.json
+
+The peers of requirements.txt are installed from PyPI into FOLDER/venv, and deltille from this repository, which needs Rust.
+What cannot be installed is not compared, and named. poppler (pdftocairo) draws the pages; Chromium is optional.
+"""
+
+import argparse
+import os
+import pathlib
+import subprocess
+import sys
+
+import protocol
+
+HERE = pathlib.Path(__file__).resolve().parent
+PROJECT = HERE.parent
+
+
+def installed(folder):
+    """Python with the peers and deltille."""
+    python = folder / "venv/bin/python"
+    if not python.exists():
+        subprocess.run([sys.executable, "-m", "venv", folder / "venv"], check=True)
+    pip = [python, "-m", "pip", "install", "--quiet"]
+    lines = (HERE / "requirements.txt").read_text().splitlines()
+    packages = [line for line in lines if line and not line.startswith("#")]
+    if subprocess.run([*pip, *packages]).returncode != 0:
+        for package in packages:
+            if subprocess.run([*pip, package]).returncode != 0:
+                print(f"not installed: {package}")
+    subprocess.run([*pip, PROJECT], check=True)
+    return python
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=pathlib.Path)
+    parser.add_argument("--seed", type=int, default=protocol.SEED)
+    parser.add_argument("--scene", nargs="*", choices=protocol.SCENES, metavar="NAME", help=", ".join(protocol.SCENES))
+    parser.add_argument("--board", nargs="*", choices=protocol.BOARDS)
+    parser.add_argument("--write", action="store_true", help="replace the tables of docs/benchmarks.md, the plot and results.json")
+    parser.add_argument("--python", type=pathlib.Path, help="an interpreter that has the packages; nothing is installed")
+    parser.add_argument("--program", type=pathlib.Path, help="the program deltille [default: it is built]")
+    given = parser.parse_args()
+    folder = given.folder.resolve()
+    folder.mkdir(parents=True, exist_ok=True)
+    # `resolve` would leave a virtual environment.
+    python = given.python.absolute() if given.python else installed(folder)
+    program = given.program and given.program.resolve()
+    if program is None:
+        subprocess.run(["cargo", "build", "--release", "--bin", "deltille"], cwd=PROJECT, check=True)
+        program = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", PROJECT / "target")) / "release/deltille"
+    chosen = [part for name in ("scene", "board") if (of := getattr(given, name)) for part in (f"--{name}", *of)]
+    script = lambda name, *arguments: subprocess.run([python, HERE / f"{name}.py", *map(str, arguments)], check=True)
+    script("photographs", program, folder, "--seed", given.seed, *chosen)
+    script("measured", folder)
+    if not chosen:
+        script("cameras", folder)
+        script("prints", program, folder)
+    done = subprocess.run([python, HERE / "tables.py", folder, *(["--write"] if given.write else [])])
+    sys.exit(done.returncode)
+
+
+if __name__ == "__main__":
+    main()

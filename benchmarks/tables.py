@@ -1,0 +1,216 @@
+"""Tables and a plot of a comparison.
+
+    python tables.py FOLDER --write        # of what the other scripts left in FOLDER, into docs/benchmarks.md and results.json
+    python tables.py --check               # the tables are those of results.json, and the claims of protocol.py hold
+"""
+
+import argparse
+import json
+import pathlib
+import platform
+import sys
+import time
+
+import protocol
+import score
+
+HERE = pathlib.Path(__file__).resolve().parent
+RESULTS = HERE / "results.json"
+DOCUMENT = HERE.parent / "docs/benchmarks.md"
+PLOT = HERE.parent / "docs/images/detectors.svg"
+BEGIN, END = "<!-- written by benchmarks/tables.py -->\n", "<!-- end -->\n"
+OURS = "deltille"
+
+
+def collected(folder):
+    """The figures of all detectors, calibrators and generators."""
+    rows = []
+    for path in sorted((folder / "found").glob("*.json")):
+        result = json.loads(path.read_text())
+        of_board = folder / result["board"] / "truth.json"
+        if not of_board.exists():
+            continue
+        truth = json.loads(of_board.read_text())
+        about = {key: result[key] for key in ("detector", "version", "settings", "board", "memory_mb")}
+        rows.append(about | score.score(truth, result))
+    order = list(protocol.BOARDS)
+    rows.sort(key=lambda row: (order.index(row["board"]), row["detector"] != OURS, row["detector"].lower()))
+    about = {"date": time.strftime("%Y-%m-%d"), "machine": processor(), "seed": truth["seed"]}
+    more = {
+        name: json.loads(path.read_text()) if (path := folder / f"{name}.json").exists() else {}
+        for name in ("cameras", "prints")
+    }
+    return {"about": about, "detectors": rows} | more
+
+
+def processor():
+    try:
+        lines = pathlib.Path("/proc/cpuinfo").read_text().splitlines()
+        return next(line.split(": ")[1] for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor() or platform.machine()
+
+
+def number(value, places):
+    return "–" if value is None else f"{value:.{places}f}"
+
+
+def table(head, rows):
+    line = lambda cells: "| " + " | ".join(cells) + " |\n"
+    return line(head) + "|" + "---|" * len(head) + "\n" + "".join(map(line, rows))
+
+
+def share(row):
+    return 100 * row["found"] / row["due"] if row["due"] else 0.0
+
+
+def behind(ours, peers):
+    """In what a peer is ahead: in corners, or in the error of at least nine tenths as many."""
+    if any(of["found"] > ours["found"] or of["wrong"] < ours["wrong"] for of in peers):
+        yield "corners"
+    as_many = (of for of in peers if of["found"] >= 0.9 * ours["found"] and of["rms_px"] is not None)
+    if any(of["rms_px"] < (ours["rms_px"] or float("inf")) for of in as_many):
+        yield "error"
+
+
+def detectors_table(results):
+    head = ["board", "detector", "corners", "wrong", "RMS px", "median px", "over bound", "e²/σ²", "ms/Mpx", "worst", "MB"]
+    rows = [
+        [
+            row["board"], f"{row['detector']} {row['version']}", f"{share(row['all']):.1f} %", str(row["all"]["wrong"]),
+            number(row["all"]["rms_px"], 4), number(row["all"]["median_px"], 4), number(row["all"]["over_bound"], 2),
+            number(row["all"]["over_stated"], 2), number(row["all"]["ms_per_mpx"], 1),
+            number(row["all"]["worst_ms_per_mpx"], 1), number(row["memory_mb"], 0),
+        ]
+        for row in results["detectors"]
+    ]
+    return table(head, rows)
+
+
+def scenes_table(results, board):
+    rows = [row for row in results["detectors"] if row["board"] == board]
+    names = [row["detector"] for row in rows]
+    cell = lambda of: f"{share(of):.0f} %, {number(of['rms_px'], 4)}" + (f", {of['wrong']} wrong" if of["wrong"] else "")
+    lines = []
+    for scene in rows[0]["scenes"]:
+        of_scene = [row["scenes"][scene] for row in rows]
+        lost = ", ".join(behind(of_scene[0], of_scene[1:])) if names[0] == OURS else ""
+        lines.append([scene, *map(cell, of_scene), lost])
+    return table(["scene", *names, "deltille is behind in"], lines)
+
+
+def cameras_table(results):
+    head = ["corners", "calibration", "projection, px", "fx, px", "fx: e²/σ²", "halves: e²/σ²", "CPU s"]
+    rows = [
+        [
+            case, name, number(of["projection_px"], 3), number(of["fx_px"], 3), number(of["over_stated"], 2),
+            number(of["halves"], 2), number(of["cpu_s"], 2),
+        ]
+        for case, by_name in results["cameras"].items()
+        for name, of in by_name.items()
+    ]
+    return table(head, rows)
+
+
+def prints_table(results):
+    head = ["generator and file", "scale across, ppm", "scale along, ppm", "RMS µm", "largest µm", "corners", "markers"]
+    rows = [
+        [
+            name, *(number(ppm, 0) for ppm in of.get("scale_ppm", [None] * 2)), number(of.get("rms_um"), 1),
+            number(of.get("largest_um"), 1), str(of["corners"]), str(of["markers"]),
+        ]
+        for name, of in results["prints"].items()
+    ]
+    return table(head, rows)
+
+
+def written(results):
+    """The part of docs/benchmarks.md."""
+    about = results["about"]
+    with_peers = [b for b in protocol.BOARDS if len({row["detector"] for row in results["detectors"] if row["board"] == b}) > 1]
+    settings = {row["detector"]: f"{row['detector']}: {row['settings']}" for row in results["detectors"]}
+    text = f"Seed {about['seed']}, {about['date']}, {about['machine']}, one thread.\n\n"
+    text += detectors_table(results) + "\n"
+    text += "![CPU time and error of each detector](images/detectors.svg)\n\n"
+    text += "Settings: " + "; ".join(settings.values()) + ".\n"
+    for board in with_peers:
+        text += f"\nCorners found and RMS error in px by scene, `{board}`:\n\n" + scenes_table(results, board)
+    if results["cameras"]:
+        text += "\nCalibrations from the same simulated corners (RMS or mean over 20 seeds):\n\n" + cameras_table(results)
+    if results["prints"]:
+        text += "\nOne ChArUco board from several generators:\n\n" + prints_table(results)
+    return text
+
+
+def plot(results, path):
+    """CPU time against error over the bound, a dot for each detector and board."""
+    import matplotlib
+
+    matplotlib.use("svg")
+    matplotlib.rcParams["svg.hashsalt"] = "deltille"
+    import matplotlib.pyplot as plt
+
+    marks = {"deltille": "^", "checkerboard": "s", "charuco": "D", "aprilgrid": "o", "tags": "p"}
+    figure, axes = plt.subplots(figsize=(8, 5))
+    for row in results["detectors"]:
+        of = row["all"]
+        # A detector that finds few corners has an error of easy ones only.
+        if of["over_bound"] is None or share(of) < 50:
+            continue
+        is_ours = row["detector"] == OURS
+        colour = "#c1121f" if is_ours else "#8d99ae"
+        axes.plot(of["ms_per_mpx"], of["over_bound"], marks[row["board"]], color=colour, markersize=9)
+        axes.annotate(row["detector"], (of["ms_per_mpx"], of["over_bound"]), xytext=(7, 4), textcoords="offset points",
+                      fontsize=8, color="#2b2d42")
+    axes.set(xscale="log", yscale="log", xlabel="CPU time in one thread, ms per megapixel", ylabel="RMS error over the bound")
+    axes.axhline(1, color="#2b2d42", linewidth=0.8, linestyle=":")
+    handles = [plt.Line2D([], [], marker=mark, linestyle="", color="#2b2d42", label=board) for board, mark in marks.items()]
+    axes.legend(handles=handles, title="board", fontsize=8, title_fontsize=8, frameon=False)
+    axes.spines[["top", "right"]].set_visible(False)
+    figure.tight_layout()
+    figure.savefig(path, metadata={"Date": None})
+
+
+def failed_claims(results, measures):
+    """Claims of protocol.py that the figures contradict, for boards that were photographed."""
+    lower_is_better = {"wrong", "rms_px", "over_bound", "ms_per_mpx"}
+    for measure in measures:
+        for board in protocol.CLAIMS[measure]:
+            of_board = {row["detector"]: row["all"] for row in results["detectors"] if row["board"] == board}
+            ours = of_board.pop(OURS, None)
+            for name, of in of_board.items():
+                # Few corners are easy ones: their error is not comparable.
+                if of[measure] is None or (measure in ("rms_px", "over_bound") and of["found"] < 0.5 * ours["found"]):
+                    continue
+                is_ahead = of[measure] < ours[measure] if measure in lower_is_better else of[measure] > ours[measure]
+                if is_ahead:
+                    yield f"{board}, {measure}: {name} {of[measure]:.4g}, deltille {ours[measure]:.4g}"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", nargs="?", type=pathlib.Path)
+    parser.add_argument("--write", action="store_true", help="replace the tables of docs/benchmarks.md, the plot and results.json")
+    parser.add_argument("--check", action="store_true", help="check the committed tables")
+    given = parser.parse_args()
+    results = json.loads(RESULTS.read_text()) if given.check or not given.folder else collected(given.folder)
+    text = written(results)
+    before, rest = DOCUMENT.read_text().split(BEGIN)
+    current, after = rest.split(END)
+    if given.write:
+        RESULTS.write_text(json.dumps(results, indent=1) + "\n")
+        DOCUMENT.write_text(before + BEGIN + "\n" + text + "\n" + END + after)
+        plot(results, PLOT)
+    elif given.check and current.strip() != text.strip():
+        sys.exit("docs/benchmarks.md is not what results.json says: run tables.py --write")
+    else:
+        print(text)
+    # Times of a single run on a busy machine are no test.
+    measures = [of for of in protocol.CLAIMS if of != "ms_per_mpx" or given.write or given.check]
+    failed = list(failed_claims(results, measures))
+    if failed:
+        sys.exit("deltille is not ahead as claimed:\n  " + "\n  ".join(failed))
+
+
+if __name__ == "__main__":
+    main()
