@@ -81,5 +81,7 @@ if __name__ == "__main__":
     given = parser.parse_args()
     if given.detector:
         one(given.folder, next(of for of in detectors.ALL if of.name == given.detector), given.of)
+        # Without destructors, in which pupil-apriltags may crash.
+        os._exit(0)
     else:
         run(given.folder)

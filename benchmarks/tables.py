@@ -17,6 +17,7 @@ import score
 HERE = pathlib.Path(__file__).resolve().parent
 RESULTS = HERE / "results.json"
 DOCUMENT = HERE.parent / "docs/benchmarks.md"
+README = HERE.parent / "README.md"
 PLOT = HERE.parent / "docs/images/detectors.svg"
 BEGIN, END = "<!-- written by benchmarks/tables.py -->\n", "<!-- end -->\n"
 OURS = "deltille"
@@ -90,13 +91,14 @@ def detectors_table(results):
 def scenes_table(results, board):
     rows = [row for row in results["detectors"] if row["board"] == board]
     names = [row["detector"] for row in rows]
+    has_ours = names[0] == OURS
     cell = lambda of: f"{share(of):.0f} %, {number(of['rms_px'], 4)}" + (f", {of['wrong']} wrong" if of["wrong"] else "")
     lines = []
     for scene in rows[0]["scenes"]:
         of_scene = [row["scenes"][scene] for row in rows]
-        lost = ", ".join(behind(of_scene[0], of_scene[1:])) if names[0] == OURS else ""
-        lines.append([scene, *map(cell, of_scene), lost])
-    return table(["scene", *names, "deltille is behind in"], lines)
+        lost = [", ".join(behind(of_scene[0], of_scene[1:]))] if has_ours else []
+        lines.append([scene, *map(cell, of_scene), *lost])
+    return table(["scene", *names, *(["deltille is behind in"] if has_ours else [])], lines)
 
 
 def cameras_table(results):
@@ -142,6 +144,20 @@ def written(results):
     return text
 
 
+def for_readme(results):
+    """Boards that others read too: deltille beside the detector that finds most corners."""
+    lines = []
+    cell = lambda of: f"{share(of):.1f} %, {number(of['rms_px'], 4)} px, {number(of['ms_per_mpx'], 0)} ms/Mpx"
+    for board in protocol.BOARDS:
+        of_board = {row["detector"]: row["all"] for row in results["detectors"] if row["board"] == board}
+        ours = of_board.pop(OURS, None)
+        if ours is None or not of_board:
+            continue
+        name, best = max(of_board.items(), key=lambda of: (of[1]["found"], -of[1]["rms_px"]))
+        lines.append([f"`{board}`", cell(ours), f"{cell(best)} ({name})"])
+    return table(["18 scenes: corners found, RMS error, CPU time", OURS, "the peer that finds most"], lines)
+
+
 def plot(results, path):
     """CPU time against error over the bound, a dot for each detector and board."""
     import matplotlib
@@ -152,20 +168,32 @@ def plot(results, path):
 
     marks = {"deltille": "^", "checkerboard": "s", "charuco": "D", "aprilgrid": "o", "tags": "p"}
     figure, axes = plt.subplots(figsize=(8, 5))
-    for row in results["detectors"]:
-        of = row["all"]
-        # A detector that finds few corners has an error of easy ones only.
-        if of["over_bound"] is None or share(of) < 50:
-            continue
-        is_ours = row["detector"] == OURS
+    # A detector that finds few corners has an error of easy ones only.
+    shown = [row for row in results["detectors"] if row["all"]["over_bound"] is not None and share(row["all"]) >= 50]
+    axes.set(xscale="log", yscale="log", xlim=(3, 1000), ylim=(0.8, 200))
+    axes.set(xlabel="CPU time in one thread, ms per megapixel", ylabel="RMS error over the bound")
+    at = [axes.transData.transform((row["all"]["ms_per_mpx"], row["all"]["over_bound"])) for row in shown]
+    taken = [(x - 6, y - 6, x + 6, y + 6) for x, y in at]
+    for row, (x, y) in zip(shown, at):
+        of, is_ours = row["all"], row["detector"] == OURS
         colour = "#c1121f" if is_ours else "#8d99ae"
         axes.plot(of["ms_per_mpx"], of["over_bound"], marks[row["board"]], color=colour, markersize=9)
-        axes.annotate(row["detector"], (of["ms_per_mpx"], of["over_bound"]), xytext=(7, 4), textcoords="offset points",
+        if is_ours:
+            continue
+        # Beside its marker, where nothing else is.
+        width = 5.2 * len(row["detector"])
+        places = [(8, -4), (-8 - width, -4), (-width / 2, 8), (-width / 2, -16), (8, 6), (8, -14)]
+        boxes = [(x + dx, y + dy, x + dx + width, y + dy + 9) for dx, dy in places]
+        hits = lambda a: sum(a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3] for b in taken)
+        place, box = min(zip(places, boxes), key=lambda of: hits(of[1]))
+        taken.append(box)
+        axes.annotate(row["detector"], (of["ms_per_mpx"], of["over_bound"]), xytext=place, textcoords="offset pixels",
                       fontsize=8, color="#2b2d42")
-    axes.set(xscale="log", yscale="log", xlabel="CPU time in one thread, ms per megapixel", ylabel="RMS error over the bound")
     axes.axhline(1, color="#2b2d42", linewidth=0.8, linestyle=":")
-    handles = [plt.Line2D([], [], marker=mark, linestyle="", color="#2b2d42", label=board) for board, mark in marks.items()]
-    axes.legend(handles=handles, title="board", fontsize=8, title_fontsize=8, frameon=False)
+    line = lambda mark, colour, label: plt.Line2D([], [], marker=mark, linestyle="", color=colour, label=label)
+    handles = [line(mark, "#2b2d42", f"{board} board" if board == OURS else board) for board, mark in marks.items()]
+    handles += [line("s", "#c1121f", OURS), line("s", "#8d99ae", "others")]
+    axes.legend(handles=handles, fontsize=8, frameon=False)
     axes.spines[["top", "right"]].set_visible(False)
     figure.tight_layout()
     figure.savefig(path, metadata={"Date": None})
@@ -194,17 +222,19 @@ def main():
     parser.add_argument("--check", action="store_true", help="check the committed tables")
     given = parser.parse_args()
     results = json.loads(RESULTS.read_text()) if given.check or not given.folder else collected(given.folder)
-    text = written(results)
-    before, rest = DOCUMENT.read_text().split(BEGIN)
-    current, after = rest.split(END)
+    texts = {DOCUMENT: written(results), README: for_readme(results)}
     if given.write:
         RESULTS.write_text(json.dumps(results, indent=1) + "\n")
-        DOCUMENT.write_text(before + BEGIN + "\n" + text + "\n" + END + after)
         plot(results, PLOT)
-    elif given.check and current.strip() != text.strip():
-        sys.exit("docs/benchmarks.md is not what results.json says: run tables.py --write")
-    else:
-        print(text)
+    for path, text in texts.items():
+        before, rest = path.read_text().split(BEGIN)
+        current, after = rest.split(END)
+        if given.write:
+            path.write_text(before + BEGIN + "\n" + text + "\n" + END + after)
+        elif given.check and current.strip() != text.strip():
+            sys.exit(f"{path.name} is not what results.json says: run tables.py --write")
+    if not given.check:
+        print(texts[DOCUMENT])
     # Times of a single run on a busy machine are no test.
     measures = [of for of in protocol.CLAIMS if of != "ms_per_mpx" or given.write or given.check]
     failed = list(failed_claims(results, measures))

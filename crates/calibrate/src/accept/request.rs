@@ -103,7 +103,7 @@ pub enum RequestError {
     Temperature(f64),
     /// A coefficient of expansion is out of its range.
     #[error(
-        "{0} ppm/K is neither 0 nor from {low} to {high} ppm/K (23e-6/K is 23 ppm/K)",
+        "{0} ppm/K is not 0, and not from {low} to {high} ppm/K (23e-6/K is 23 ppm/K)",
         low = PPM_PER_K[0], high = PPM_PER_K[1]
     )]
     Expansion(f64),
