@@ -52,6 +52,14 @@ def processor():
         return platform.processor() or platform.machine()
 
 
+def lines(results):
+    """The figures as JSON that can be compared line by line."""
+    rows = lambda of: ",\n".join(map(json.dumps, of)) if isinstance(of, list) else ",\n".join(
+        f"{json.dumps(key)}: {json.dumps(value)}" for key, value in of.items())
+    part = lambda of: f"[\n{rows(of)}\n]" if isinstance(of, list) else f"{{\n{rows(of)}\n}}"
+    return "{\n" + ",\n".join(f"{json.dumps(key)}: {part(of)}" for key, of in results.items()) + "\n}\n"
+
+
 def number(value, places):
     return "–" if value is None else f"{value:.{places}f}"
 
@@ -163,7 +171,7 @@ def plot(results, path):
     import matplotlib
 
     matplotlib.use("svg")
-    matplotlib.rcParams["svg.hashsalt"] = "deltille"
+    matplotlib.rcParams |= {"svg.hashsalt": "deltille", "svg.fonttype": "none", "font.family": "sans-serif"}
     import matplotlib.pyplot as plt
 
     marks = {"deltille": "^", "checkerboard": "s", "charuco": "D", "aprilgrid": "o", "tags": "p"}
@@ -222,9 +230,10 @@ def main():
     parser.add_argument("--check", action="store_true", help="check the committed tables")
     given = parser.parse_args()
     results = json.loads(RESULTS.read_text()) if given.check or not given.folder else collected(given.folder)
+    results = json.loads(json.dumps(results), parse_float=lambda text: float(f"{float(text):.5g}"))
     texts = {DOCUMENT: written(results), README: for_readme(results)}
     if given.write:
-        RESULTS.write_text(json.dumps(results, indent=1) + "\n")
+        RESULTS.write_text(lines(results))
         plot(results, PLOT)
     for path, text in texts.items():
         before, rest = path.read_text().split(BEGIN)
