@@ -22,6 +22,9 @@ import numpy as np
 import photograph as pages
 import protocol
 
+# The smallest files of images with noise.
+PACKED = [cv2.IMWRITE_PNG_COMPRESSION, 9, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE]
+
 
 def bound(clean, noise, places, reach):
     """The least covariance of each corner (Cramér and Rao), px²: of the position of a known pattern in the pixels that are
@@ -140,7 +143,7 @@ def one(folder, board, scene, seed):
     for number in range(protocol.VIEWS):
         name = f"{slug(scene)}-{number}"
         image, corners = shoot(page, protocol.SCENES[scene], [seed, number, *scene.encode()])
-        cv2.imwrite(str(folder / board / f"{name}.png"), image, [cv2.IMWRITE_PNG_COMPRESSION, 9])
+        cv2.imwrite(str(folder / board / f"{name}.png"), image, PACKED)
         found.append((name, {"scene": scene, "corners": corners}))
     return found
 
