@@ -43,7 +43,7 @@ def bound(clean, noise, places, reach):
             found.append(None)
             continue
         covariance = np.linalg.inv(information)
-        found.append([covariance[0, 0], covariance[0, 1], covariance[1, 1]])
+        found.append([float(f"{value:.4g}") for value in (covariance[0, 0], covariance[0, 1], covariance[1, 1])])
     return found
 
 
@@ -90,7 +90,8 @@ def shoot(page, scene, seed):
     nearest = apart.min(1)
     bounds = bound(clean, scene.noise, truth, nearest / 2) if clean is not None else [None] * len(truth)
     corners = [
-        {"label": label, "x": place[0], "y": place[1], "nearest_px": near, "bound": least, "visible": bool(seen)}
+        {"label": label, "x": round(place[0], 6), "y": round(place[1], 6), "nearest_px": round(near, 2), "bound": least,
+         "visible": bool(seen)}
         for label, place, near, least, seen in zip(page.labels, truth, nearest, bounds, visible)
     ]
     return image, corners

@@ -4,7 +4,8 @@
 
 Each page is drawn by two programs at 600 dpi where its format allows it. OpenCV finds the corners on the page; a similarity with
 separate scales along both axes is fitted to their nominal positions, and what remains are errors of single corners. An image
-without a format for printing is measured at the resolution for which it was requested.
+without a format for printing is measured at the resolution for which it was requested. The detector of the same project reads
+each page, reduced to 75 dpi.
 """
 
 import json
@@ -15,6 +16,7 @@ import sys
 import cv2
 import numpy as np
 
+import detectors
 import protocol
 
 DPI = 600
@@ -51,7 +53,12 @@ def pages_of_calib_targets(_, folder):
     yield f"image, {IMAGE_DPI} dpi", cv2.imread(str(written.png_path), cv2.IMREAD_GRAYSCALE), IMAGE_DPI
 
 
-GENERATORS = {"deltille": pages_of_deltille, "OpenCV CharucoBoard": pages_of_opencv, "calib-targets": pages_of_calib_targets}
+# The pages, and the detector of the same project.
+GENERATORS = {
+    "deltille": (pages_of_deltille, detectors.Deltille),
+    "OpenCV CharucoBoard": (pages_of_opencv, detectors.OpenCvCharuco),
+    "calib-targets": (pages_of_calib_targets, detectors.CalibTargets),
+}
 
 
 def by_poppler(path):
@@ -122,9 +129,14 @@ def main(deltille, folder):
     made = folder / "prints"
     made.mkdir(parents=True, exist_ok=True)
     table = {}
-    for name, pages in GENERATORS.items():
+    for name, (pages, own) in GENERATORS.items():
+        detect = own("charuco", folder / "boards")
         for way, image, dpi in pages(deltille, made):
-            table[f"{name}: {way}"] = measured(image, dpi)
+            # As a photograph would show it.
+            scale = 75 / dpi
+            seen = cv2.copyMakeBorder(image, *[dpi // 2] * 4, cv2.BORDER_CONSTANT, value=255)
+            seen = cv2.resize(seen, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+            table[f"{name}: {way}"] = measured(image, dpi) | {"by_own_detector": len(detect(seen))}
             print(name, way, table[f"{name}: {way}"], flush=True)
     (folder / "prints.json").write_text(json.dumps(table))
 

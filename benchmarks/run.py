@@ -42,6 +42,7 @@ def main():
     parser.add_argument("--seed", type=int, default=protocol.SEED)
     parser.add_argument("--scene", nargs="*", choices=protocol.SCENES, metavar="NAME", help=", ".join(protocol.SCENES))
     parser.add_argument("--board", nargs="*", choices=protocol.BOARDS)
+    parser.add_argument("--fisheye", type=pathlib.Path, help="folder with the photographs `fisheye` of the paper's data set")
     parser.add_argument("--write", action="store_true", help="replace the tables of docs/benchmarks.md, the plot and results.json")
     parser.add_argument("--python", type=pathlib.Path, help="an interpreter that has the packages; nothing is installed")
     parser.add_argument("--program", type=pathlib.Path, help="the program deltille [default: it is built]")
@@ -61,6 +62,8 @@ def main():
     if not chosen:
         script("cameras", folder)
         script("prints", program, folder)
+    if given.fisheye:
+        script("fisheye", program, folder, given.fisheye.resolve())
     done = subprocess.run([python, HERE / "tables.py", folder, *(["--write"] if given.write else [])])
     sys.exit(done.returncode)
 

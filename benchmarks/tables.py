@@ -39,7 +39,7 @@ def collected(folder):
     about = {"date": time.strftime("%Y-%m-%d"), "machine": processor(), "seed": truth["seed"]}
     more = {
         name: json.loads(path.read_text()) if (path := folder / f"{name}.json").exists() else {}
-        for name in ("cameras", "prints")
+        for name in ("cameras", "prints", "fisheye")
     }
     return {"about": about, "detectors": rows} | more
 
@@ -110,10 +110,10 @@ def scenes_table(results, board):
 
 
 def cameras_table(results):
-    head = ["corners", "calibration", "projection, px", "fx, px", "fx: e²/σ²", "halves: e²/σ²", "CPU s"]
+    head = ["corners", "calibration", "projection, px", "held out, px", "fx, px", "fx: e²/σ²", "halves: e²/σ²", "CPU s"]
     rows = [
         [
-            case, name, number(of["projection_px"], 3), number(of["fx_px"], 3), number(of["over_stated"], 2),
+            case, name, number(of["projection_px"], 3), number(of["held_out_px"], 4), number(of["fx_px"], 3), number(of["over_stated"], 2),
             number(of["halves"], 2), number(of["cpu_s"], 2),
         ]
         for case, by_name in results["cameras"].items()
@@ -122,12 +122,26 @@ def cameras_table(results):
     return table(head, rows)
 
 
+def fisheye_table(results):
+    rows = [
+        [
+            f"{of['detector']} {of['version']}", f"{of['found']} of {of['due']}", f"{of['whole']} of {of['photographs']}",
+            number(of["ms_per_mpx"], 1), number(of["worst_ms_per_mpx"], 1),
+        ]
+        for of in results["fisheye"]
+    ]
+    return table(["detector", "corners", "whole boards", "ms/Mpx", "worst"], rows)
+
+
 def prints_table(results):
-    head = ["generator and file", "scale across, ppm", "scale along, ppm", "RMS µm", "largest µm", "corners", "markers"]
+    head = [
+        "generator and file", "scale across, ppm", "scale along, ppm", "RMS µm", "largest µm", "corners", "markers",
+        "corners by its own detector",
+    ]
     rows = [
         [
             name, *(number(ppm, 0) for ppm in of.get("scale_ppm", [None] * 2)), number(of.get("rms_um"), 1),
-            number(of.get("largest_um"), 1), str(of["corners"]), str(of["markers"]),
+            number(of.get("largest_um"), 1), str(of["corners"]), str(of["markers"]), str(of["by_own_detector"]),
         ]
         for name, of in results["prints"].items()
     ]
@@ -145,6 +159,9 @@ def written(results):
     text += "Settings: " + "; ".join(settings.values()) + ".\n"
     for board in with_peers:
         text += f"\nCorners found and RMS error in px by scene, `{board}`:\n\n" + scenes_table(results, board)
+    if results["fisheye"]:
+        text += "\nPhotographs of a checkerboard of 8 × 11 corners through a fisheye of 220° (the paper's set `fisheye`):\n\n"
+        text += fisheye_table(results)
     if results["cameras"]:
         text += "\nCalibrations from the same simulated corners (RMS or mean over 20 seeds):\n\n" + cameras_table(results)
     if results["prints"]:
