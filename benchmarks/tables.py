@@ -163,7 +163,7 @@ def written(results):
         text += "\nPhotographs of a checkerboard of 8 × 11 corners through a fisheye of 220° (the paper's set `fisheye`):\n\n"
         text += fisheye_table(results)
     if results["cameras"]:
-        text += "\nCalibrations from the same simulated corners (RMS or mean over 20 seeds):\n\n" + cameras_table(results)
+        text += "\nCalibrations from the same simulated corners (RMS or mean over 20 seeds; `calibrateCameraRO`: 5):\n\n" + cameras_table(results)
     if results["prints"]:
         text += "\nOne ChArUco board from several generators:\n\n" + prints_table(results)
     return text
