@@ -229,7 +229,7 @@ def conventions():
         said("has a pose of its own", change=lambda pose: cell.robot[0])
         scaled = lambda pose, by: np.vstack([np.column_stack([pose[:3, :3], pose[:3, 3] * by]), [0, 0, 0, 1]])
         said("multiplied by 0.9", change=lambda pose: scaled(pose, 1 / 0.99), code=0)
-        said("given noise of the robot does not explain", code=0, options=["--robot-noise", "0.2deg,1mm"])
+        said("given noise of the robot differs significantly", code=0, options=["--robot-noise", "0.2deg,1mm"])
         said("contradict each other by far more than the given noise", code=2, options=["--robot-noise", "0.0002deg,0.001mm"])
         assert "warning" not in said("", code=0, options=["--robot-noise", "0.02deg,0.1mm"]).stderr
         said("only 2 photographs have", write=edited(lambda lines: lines[:3]))
