@@ -113,7 +113,7 @@ def cameras_table(results):
     head = ["corners", "calibration", "projection, px", "held out, px", "fx, px", "fx: e²/σ²", "halves: e²/σ²", "CPU s"]
     rows = [
         [
-            case, name, number(of["projection_px"], 3), number(of["held_out_px"], 4), number(of["fx_px"], 3), number(of["over_stated"], 2),
+            case, name, number(of["projection_px"], 3), number(of.get("held_out_px"), 4), number(of["fx_px"], 3), number(of["over_stated"], 2),
             number(of["halves"], 2), number(of["cpu_s"], 2),
         ]
         for case, by_name in results["cameras"].items()
@@ -141,7 +141,7 @@ def prints_table(results):
     rows = [
         [
             name, *(number(ppm, 0) for ppm in of.get("scale_ppm", [None] * 2)), number(of.get("rms_um"), 1),
-            number(of.get("largest_um"), 1), str(of["corners"]), str(of["markers"]), str(of["by_own_detector"]),
+            number(of.get("largest_um"), 1), str(of["corners"]), str(of["markers"]), str(of.get("by_own_detector", "–")),
         ]
         for name, of in results["prints"].items()
     ]
@@ -159,7 +159,7 @@ def written(results):
     text += "Settings: " + "; ".join(settings.values()) + ".\n"
     for board in with_peers:
         text += f"\nCorners found and RMS error in px by scene, `{board}`:\n\n" + scenes_table(results, board)
-    if results["fisheye"]:
+    if results.get("fisheye"):
         text += "\nPhotographs of a checkerboard of 8 × 11 corners through a fisheye of 220° (the paper's set `fisheye`):\n\n"
         text += fisheye_table(results)
     if results["cameras"]:
