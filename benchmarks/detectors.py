@@ -68,6 +68,13 @@ class Deltille(Detector):
 
     def __call__(self, image):
         found = self.detect(np.ascontiguousarray(image[..., ::-1]) if image.ndim == 3 else image)
+        if self.board == "checkerboard":
+            # Where a part of the board fits in several places, its corners have no ids.
+            grid = max(found.grids, key=len, default=None)
+            return [] if grid is None else [
+                ({"row": int(row), "col": int(col)}, x, y, [cov[0, 0], cov[0, 1], cov[1, 1]])
+                for row, col, (x, y), cov in zip(grid.rows, grid.cols, grid.pixels, grid.covariances)
+            ]
         return [
             ({"id": int(number)}, x, y, [cov[0, 0], cov[0, 1], cov[1, 1]])
             for grid in found.grids
