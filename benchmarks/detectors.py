@@ -83,8 +83,21 @@ class Deltille(Detector):
         ]
 
 
-class OpenCvClassic(Detector):
-    name, package, boards = "OpenCV findChessboardCorners", "opencv-contrib-python-headless", ("checkerboard",)
+class OpenCv(Detector):
+    package = "opencv-contrib-python-headless"
+
+    @classmethod
+    def version(cls):
+        # There are four packages with OpenCV.
+        try:
+            import cv2
+        except ImportError as error:
+            raise importlib.metadata.PackageNotFoundError(cls.package) from error
+        return cv2.__version__
+
+
+class OpenCvClassic(OpenCv):
+    name, boards = "OpenCV findChessboardCorners", ("checkerboard",)
     settings = "adaptive threshold and normalisation, then cornerSubPix, window 5 × 5 (half size), 30 iterations, 0.001"
 
     def __call__(self, image):
@@ -98,8 +111,8 @@ class OpenCvClassic(Detector):
         return numbered(cv2.cornerSubPix(picture, corners, (5, 5), (-1, -1), criteria), size)
 
 
-class OpenCvSb(Detector):
-    name, package, boards = "OpenCV findChessboardCornersSB", "opencv-contrib-python-headless", ("checkerboard",)
+class OpenCvSb(OpenCv):
+    name, boards = "OpenCV findChessboardCornersSB", ("checkerboard",)
     settings = "CALIB_CB_NORMALIZE_IMAGE | CALIB_CB_ACCURACY"
 
     def __call__(self, image):
@@ -118,8 +131,8 @@ def numbered(corners, size):
     ]
 
 
-class OpenCvCharuco(Detector):
-    name, package, boards = "OpenCV CharucoDetector", "opencv-contrib-python-headless", ("charuco",)
+class OpenCvCharuco(OpenCv):
+    name, boards = "OpenCV CharucoDetector", ("charuco",)
     settings = "CORNER_REFINE_SUBPIX for markers, otherwise defaults"
 
     def prepare(self):
@@ -138,8 +151,8 @@ class OpenCvCharuco(Detector):
         return [({"id": int(i)}, float(x), float(y), None) for i, (x, y) in zip(np.ravel(ids), np.reshape(corners, (-1, 2)))]
 
 
-class OpenCvAprilTag(Detector):
-    name, package, boards = "OpenCV ArucoDetector", "opencv-contrib-python-headless", ("aprilgrid", "tags")
+class OpenCvAprilTag(OpenCv):
+    name, boards = "OpenCV ArucoDetector", ("aprilgrid", "tags")
     settings = "DICT_APRILTAG_36h11, CORNER_REFINE_SUBPIX, otherwise defaults"
 
     def prepare(self):
