@@ -142,15 +142,11 @@ def one(folder, board, scene, seed):
     (folder / board).mkdir(exist_ok=True)
     found = []
     for number in range(protocol.VIEWS):
-        name = f"{slug(scene)}-{number}"
+        name = f"{protocol.slug(scene)}-{number}"
         image, corners = shoot(page, protocol.SCENES[scene], [seed, number, *scene.encode()])
         cv2.imwrite(str(folder / board / f"{name}.png"), image, PACKED)
         found.append((name, {"scene": scene, "corners": corners}))
     return found
-
-
-def slug(scene):
-    return "".join(letter if letter.isalnum() else "-" for letter in scene.lower()).strip("-")
 
 
 def arguments(parser):

@@ -70,6 +70,12 @@ WRONG = 0.3
 # Corners nearer to the border of the picture are not counted.
 BORDER_PX = 4
 
+
+def slug(name):
+    """A name as a part of a file name."""
+    return "".join(letter if letter.isalnum() else "-" for letter in name.lower()).strip("-")
+
+
 # Calibrations from simulated corners.
 CALIBRATIONS = 20
 CALIBRATION_VIEWS = 20

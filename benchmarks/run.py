@@ -1,6 +1,6 @@
 """deltille beside other detectors, calibrators and generators: installs them, makes the data, measures, and prints tables.
 
-    python benchmarks/run.py FOLDER                # everything: about an hour on two cores
+    python benchmarks/run.py FOLDER                # everything: about half an hour on two cores
     python benchmarks/run.py FOLDER --scene usual "tilt 60°" --board charuco
     python benchmarks/run.py FOLDER --write        # also into docs/benchmarks.md, its plot and results.json
 

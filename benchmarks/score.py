@@ -1,4 +1,4 @@
-"""Scores detections of the benchmark's photographs. Needs Python and numpy only.
+"""Scores detections of the benchmark's photographs. Needs Python, numpy, and `protocol.py` beside it.
 
     python score.py FOLDER/charuco/truth.json mine.json
 
@@ -30,7 +30,7 @@ from collections import Counter
 
 import numpy as np
 
-WRONG = 0.3
+from protocol import WRONG
 
 
 def labelled(truth, corners):

@@ -231,6 +231,9 @@ def failed_claims(results, measures):
         for board in protocol.CLAIMS[measure]:
             of_board = {row["detector"]: row["all"] for row in results["detectors"] if row["board"] == board}
             ours = of_board.pop(OURS, None)
+            if ours is None and of_board:
+                yield f"{board}: deltille is missing"
+                continue
             for name, of in of_board.items():
                 # Few corners are easy ones: their error is not comparable.
                 if of[measure] is None or (measure in ("rms_px", "over_bound") and of["found"] < 0.5 * ours["found"]):
