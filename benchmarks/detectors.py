@@ -8,6 +8,10 @@ or None. Add a class to `ALL` to compare another one.
 
 import importlib.metadata
 import json
+import os
+import pathlib
+import subprocess
+import tempfile
 
 import numpy as np
 
@@ -140,6 +144,7 @@ class OpenCvCharuco(OpenCv):
 
         dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, self.spec["dictionary"]))
         board = cv2.aruco.CharucoBoard(self.spec["squares"], self.spec["square_mm"], self.spec["marker_mm"], dictionary)
+        board.setLegacyPattern(self.spec.get("legacy", False))
         parameters = cv2.aruco.DetectorParameters()
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
         self.detect = cv2.aruco.CharucoDetector(board, cv2.aruco.CharucoParameters(), parameters)
@@ -153,13 +158,17 @@ class OpenCvCharuco(OpenCv):
 
 class OpenCvAprilTag(OpenCv):
     name, boards = "OpenCV ArucoDetector", ("aprilgrid", "tags")
-    settings = "DICT_APRILTAG_36h11, CORNER_REFINE_SUBPIX, otherwise defaults"
+    settings = "DICT_APRILTAG_36h11, CORNER_REFINE_SUBPIX, for borders of two bits in windows of two bits, otherwise defaults"
 
     def prepare(self):
         import cv2
 
         parameters = cv2.aruco.DetectorParameters()
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+        parameters.markerBorderBits = round(self.spec["border_bits"])
+        if parameters.markerBorderBits > 1:
+            # The default, 0.3 bits, is too small to reach the corner.
+            parameters.relativeCornerRefinmentWinSize = self.spec["border_bits"]
         dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
         self.detect = cv2.aruco.ArucoDetector(dictionary, parameters)
 
@@ -181,6 +190,8 @@ class CalibTargets(Detector):
             sweep = ct.ChessboardParams.sweep_default()
             self.detect = lambda picture: ct.detect_chessboard_best(picture, sweep)
             return
+        if self.spec.get("legacy"):
+            raise ValueError("does not read legacy patterns")
         columns, rows = self.spec["squares"]
         board = ct.CharucoBoardSpec(
             rows=rows, cols=columns, cell_size=self.spec["square_mm"], dictionary=self.spec["dictionary"],
@@ -206,6 +217,8 @@ class AprilTag3(Detector):
     settings = "tag36h11, quad_decimate 1, refine_edges; pixel centres at one half, subtracted"
 
     def detector(self, module):
+        if self.spec["border_bits"] != 1:
+            raise ValueError("reads borders of one bit only")
         return module.Detector(families="tag36h11", nthreads=1, quad_decimate=1.0, refine_edges=1)
 
     def __call__(self, image):
@@ -245,6 +258,41 @@ class Locus(Detector):
         return self.tags_to_corners(zip(found.ids, found.corners), CW_FROM_LOWER_RIGHT, -0.5)
 
 
+class Reference(Detector):
+    """The detector of Ha et al., built by the user: a program that is called as `PROGRAM board.json image.png FOLDER` and writes a
+    list of corners, FOLDER/*.orpc (docs/formats.md)."""
+
+    name, boards = "detector of Ha et al.", ("deltille", "checkerboard")
+    settings = "as the given program runs it; CPU time includes the start of the program"
+
+    def prepare(self):
+        corners = json.loads(self.path.read_text())["panels"][0]["corners"]
+        self.columns = 1 + max(corner["col"] for corner in corners)
+        self.ids = {(corner["row"], corner["col"]): corner["id"] for corner in corners}
+
+    @classmethod
+    def version(cls):
+        if "REFERENCE_DETECTOR" not in os.environ:
+            raise importlib.metadata.PackageNotFoundError("run.py --reference")
+        return ""
+
+    def __call__(self, image):
+        import cv2
+
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder)
+            cv2.imwrite(str(path / "image.png"), grey(image))
+            command = [os.environ["REFERENCE_DETECTOR"], self.path, path / "image.png", path]
+            subprocess.run([str(of) for of in command], check=True, capture_output=True)
+            lines = next(path.glob("*.orpc")).read_text().splitlines()
+        corners = []
+        for _, point, ordered, x, y in (line.split(",") for line in lines if line.count(",") == 4):
+            row, col = divmod(int(point), self.columns)
+            label = {"id": self.ids.get((row, col), -1)} if ordered == "1" else {"row": row, "col": col}
+            corners.append((label, float(x), float(y), None))
+        return corners
+
+
 ALL = [
-    Deltille, OpenCvClassic, OpenCvSb, OpenCvCharuco, OpenCvAprilTag, CalibTargets, PupilAprilTags, PyAprilTags, Locus,
+    Deltille, Reference, OpenCvClassic, OpenCvSb, OpenCvCharuco, OpenCvAprilTag, CalibTargets, PupilAprilTags, PyAprilTags, Locus,
 ]

@@ -21,6 +21,13 @@ import protocol
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "RAYON_NUM_THREADS": "1"}
 
 
+def cpu_s():
+    """CPU time of this process and of the programs that it has run, s."""
+    of = os.times()
+    # Of this process with more digits.
+    return time.process_time() + of.children_user + of.children_system
+
+
 def run(folder):
     """Measures what is installed; prints what is not."""
     (folder / "found").mkdir(exist_ok=True)
@@ -28,13 +35,24 @@ def run(folder):
         try:
             detector.version()
         except importlib.metadata.PackageNotFoundError:
-            print(f"not compared, because it is not installed: {detector.name} ({detector.package})")
+            print(f"not compared, because it is not installed: {detector.name}")
             continue
         for board in (board for board in detector.boards if (folder / board / "truth.json").exists()):
             command = [sys.executable, __file__, str(folder), "--detector", detector.name, "--of", board]
             code = subprocess.run(command, env=os.environ | ONE_THREAD).returncode
             if code != 0:
                 print(f"not compared: {detector.name} on {board} ended with exit code {code}")
+
+
+def alone(script, detector, *arguments):
+    """What `script --one … <detector>` prints as JSON, in a process and a thread of its own; None if it fails."""
+    command = [str(of) for of in (sys.executable, script, "--one", *arguments, detector.name)]
+    done = subprocess.run(command, env=os.environ | ONE_THREAD, capture_output=True, text=True)
+    if done.returncode:
+        reason = (done.stderr.strip() or f"exit code {done.returncode}").splitlines()[-1]
+        print(f"not compared: {detector.name}: {reason}", flush=True)
+        return None
+    return json.loads(done.stdout)
 
 
 def one(folder, detector, board):
@@ -49,9 +67,9 @@ def one(folder, detector, board):
     detect(next(iter(pictures.values())))
     found = {}
     for name, picture in pictures.items():
-        begin = time.process_time()
+        begin = cpu_s()
         corners = detect(picture)
-        seconds = time.process_time() - begin
+        seconds = cpu_s() - begin
         corners = [{"label": label, "x": x, "y": y, "covariance": covariance} for label, x, y, covariance in corners]
         found[name] = {"corners": corners, "cpu_s": seconds, "px": picture.shape[0] * picture.shape[1]}
     after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

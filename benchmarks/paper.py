@@ -1,9 +1,10 @@
-"""Photographs by a fisheye of 220° of the paper's data set: which corners of the board do detectors find?
+"""Photographs of the paper's data set: which corners of the board do detectors find?
 
-    python fisheye.py path/to/deltille FOLDER DATA     # DATA has the photographs; writes FOLDER/fisheye.json
+    python paper.py path/to/deltille FOLDER DATA     # DATA has the folders fisheye and robot-hand; writes FOLDER/paper.json
 
-The set `fisheye` of Ha et al. 2017 (CC BY 4.0) shows a checkerboard of 8 × 11 corners, whole in every photograph. Nobody knows the
-true corners, so only their number is compared.
+The data set of Ha et al. 2017 (CC BY 4.0) shows a checkerboard of 8 × 11 corners through a fisheye of 220° (`fisheye`), and a
+deltille grid of 10 × 11 corners (`robot-hand`), both without tags and whole in every photograph. Nobody knows the true corners, so
+only their number is compared.
 """
 
 import json
@@ -11,55 +12,60 @@ import os
 import pathlib
 import subprocess
 import sys
-import time
 
 import detectors
-from measured import ONE_THREAD
+import measured
 
-COMMAND = "checkerboard --rows 8 --cols 11 --edge 20mm --name checkerboard"
+# The folder of the set, the name of the board in detectors.py, and the command that describes it.
+SETS = [
+    ("fisheye", "checkerboard", "checkerboard --rows 8 --cols 11 --edge 20mm"),
+    ("robot-hand", "deltille", "board --rows 10 --cols 11 --edge 20mm --untagged"),
+]
 
 
-def one(folder, data, name):
+def one(folder, board, data, name):
     """Measures a detector in this process, and prints its figures."""
     import cv2
     import numpy as np
 
     cv2.setNumThreads(1)
     detector = next(of for of in detectors.ALL if of.name == name)
-    detect = detector("checkerboard", folder)
+    detect = detector(board, folder)
     count = detect.spec["rows"] * detect.spec["cols"]
-    paths = sorted(path for path in data.iterdir() if path.suffix.lower() in (".png", ".jpg", ".jpeg"))
     found, times = [], []
-    for path in paths:
+    for path in photographs(data):
         picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
-        begin = time.process_time()
+        begin = measured.cpu_s()
         found.append(len(detect(picture)))
-        times.append(1e9 * (time.process_time() - begin) / picture.size)
+        times.append(1e9 * (measured.cpu_s() - begin) / picture.size)
     print(json.dumps({
-        "detector": name, "version": detector.version(), "photographs": len(paths), "whole": sum(of == count for of in found),
-        "found": sum(found), "due": count * len(paths), "ms_per_mpx": float(np.median(times)),
-        "worst_ms_per_mpx": float(np.max(times)),
+        "set": data.name, "detector": name, "version": detector.version(), "photographs": len(found),
+        "whole": sum(of == count for of in found), "found": sum(found), "due": count * len(found),
+        "ms_per_mpx": float(np.median(times)), "worst_ms_per_mpx": float(np.max(times)),
     }), flush=True)
 
 
+def photographs(data):
+    return sorted(path for path in data.iterdir() if path.suffix.lower() in (".png", ".jpg", ".jpeg"))
+
+
 def main(deltille, folder, data):
-    made = folder / "fisheye-board"
-    subprocess.run([str(part) for part in (deltille, *COMMAND.split(), "-o", made, "--force")], check=True, capture_output=True)
-    table = []
-    for detector in detectors.ALL:
-        if "checkerboard" in detector.boards:
-            command = [sys.executable, __file__, "--one", made, data, detector.name]
-            done = subprocess.run([str(of) for of in command], env=os.environ | ONE_THREAD, capture_output=True, text=True)
-            if done.returncode:
-                print(f"not compared: {detector.name}: {(done.stderr.strip() or 'no output').splitlines()[-1]}")
-                continue
-            table.append(json.loads(done.stdout))
-            print(table[-1], flush=True)
-    (folder / "fisheye.json").write_text(json.dumps(table))
+    made, table = folder / "paper-boards", []
+    for name, board, command in SETS:
+        if not (data / name).is_dir():
+            print(f"skipped: {data / name} does not exist")
+            continue
+        command = [deltille, *command.split(), "--name", board, "-o", made, "--force", "--no-verify"]
+        subprocess.run([str(part) for part in command], check=True, capture_output=True)
+        for detector in detectors.ALL:
+            if board in detector.boards and (row := measured.alone(__file__, detector, made, board, data / name)) is not None:
+                table.append(row)
+                print(row, flush=True)
+    (folder / "paper.json").write_text(json.dumps(table))
 
 
 if __name__ == "__main__":
     if sys.argv[1] == "--one":
-        one(pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3]), sys.argv[4])
+        one(pathlib.Path(sys.argv[2]), sys.argv[3], pathlib.Path(sys.argv[4]), sys.argv[5])
         os._exit(0)
-    main(*(pathlib.Path(path) for path in sys.argv[1:4]))
+    main(*(pathlib.Path(path).resolve() for path in sys.argv[1:4]))

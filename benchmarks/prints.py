@@ -5,7 +5,8 @@
 Each page is drawn by two programs at 600 dpi where its format allows it. OpenCV finds the corners on the page; a similarity with
 separate scales along both axes is fitted to their nominal positions, and what remains are errors of single corners. An image
 without a format for printing is measured at the resolution for which it was requested. The detector of the same project reads
-each page, reduced to 75 dpi.
+each page, reduced to 75 dpi. A 3MF file for printers with two colours is drawn as seen from above its face, and the corners of
+its AprilTags are where lines fitted to their edges meet.
 """
 
 import json
@@ -17,7 +18,9 @@ import cv2
 import numpy as np
 
 import detectors
+import meshes
 import protocol
+import public
 
 DPI = 600
 IMAGE_DPI = 300
@@ -53,12 +56,57 @@ def pages_of_calib_targets(_, folder):
     yield f"image, {IMAGE_DPI} dpi", cv2.imread(str(written.png_path), cv2.IMREAD_GRAYSCALE), IMAGE_DPI
 
 
+def pages_of_pattern_tools(_, folder):
+    """OpenCV's script generate_pattern.py, formerly gen_pattern.py, which only the sources contain."""
+    archive = public.fetched(folder.parent / "archives", "opencv")
+    if archive is None:
+        return
+    tools = folder / "pattern_tools"
+    public.extract(archive, "*/pattern-tools/*", tools)
+    path = folder / "pattern.svg"
+    board = ["--columns", COLUMNS, "--rows", ROWS, "--square_size", SQUARE_MM, "--marker_size", MARKER_MM, "-w", 297, "-h", 210]
+    board += ["-T", "charuco_board", "-f", tools / "DICT_4X4_100.json.gz", "-o", path]
+    command = [sys.executable, tools / "generate_pattern.py", *board]
+    subprocess.run([str(part) for part in command], check=True)
+    yield "SVG, cairo", *by_cairo(path)
+    yield "SVG, Chromium", *by_chromium(path)
+
+
 # The pages, and the detector of the same project.
 GENERATORS = {
     "deltille": (pages_of_deltille, detectors.Deltille),
     "OpenCV CharucoBoard": (pages_of_opencv, detectors.OpenCvCharuco),
+    "OpenCV generate_pattern.py": (pages_of_pattern_tools, detectors.OpenCvCharuco),
     "calib-targets": (pages_of_calib_targets, detectors.CalibTargets),
 }
+
+
+def mesh_of_deltille(deltille, folder):
+    options = "aprilgrid --tags 2x2 --edge 30mm --gap 0.3 --tag-border 1 --3mf --force".split()
+    subprocess.run([str(deltille), *options, "-o", str(folder)], check=True, capture_output=True)
+    panel = json.loads((folder / "aprilgrid.json").read_text())["panels"][0]
+    places = {(of["row"], of["col"]): of["target_mm"][:2] for of in panel["corners"]}
+    # As detectors.CW_FROM_LOWER_RIGHT.
+    order = [(0, 1), (0, 0), (1, 0), (1, 1)]
+    stated = {of["id"]: [places[of["row"] + up, of["col"] + right] for up, right in order] for of in panel["tags"]}
+    return folder / "aprilgrid.3mf", stated, lambda image: len(detectors.Deltille("aprilgrid", folder)(image))
+
+
+def mesh_of_aprilcube(_, folder):
+    import aprilcube
+
+    made = folder / "aprilcube"
+    options = ["--grid", "2x2x1", "--dict", "apriltag_36h11", "--tag-size", "30"]
+    subprocess.run([sys.executable, "-m", "aprilcube.cli", "generate", *options, "-o", made], check=True, capture_output=True)
+    config, faces = aprilcube.load_cube_config(str(made / "config.json"))
+    of_cube = aprilcube.build_tag_corner_map(config)
+    # Finding tags needs no camera.
+    detect = aprilcube.detector(made, np.eye(3)).detect_markers
+    return made / "cube.3mf", {tag: of_cube[tag][:, :2] for tag in faces["+Z"]}, lambda image: 4 * len(detect(image).corners)
+
+
+# The 3MF file, the corners of each tag on its upper face in OpenCV's order, and how many corners the project's detector finds.
+MESHES = {"deltille": mesh_of_deltille, "aprilcube": mesh_of_aprilcube}
 
 
 def by_poppler(path):
@@ -89,7 +137,8 @@ def by_chromium(path):
     pdf = path.with_suffix(".chromium.pdf")
     text = path.read_text()
     page = path.with_suffix(".html")
-    page.write_text(f"<style>@page {{ size: 297mm 210mm; margin: 0 }} body {{ margin: 0 }} svg {{ display: block }}</style>{text[text.index('<svg'):]}")
+    style = "@page { size: 297mm 210mm; margin: 0 } body { margin: 0 } svg { display: block }"
+    page.write_text(f"<style>{style}</style>{text[text.index('<svg'):]}")
     flags = ["--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer", f"--print-to-pdf={pdf}"]
     subprocess.run(["chromium", *flags, page.as_uri()], check=True, capture_output=True)
     return by_poppler(pdf)
@@ -114,6 +163,10 @@ def measured(image, dpi):
     places = cv2.cornerSubPix(padded, corners.astype(np.float32), (15, 15), (-1, -1), criteria).reshape(-1, 2) - 100
     page_mm = (places + 0.5) * 25.4 / dpi
     nominal = np.array(board.getChessboardCorners())[np.ravel(ids), :2]
+    return errors(page_mm, nominal) | {"corners": len(ids), "markers": len(markers)}
+
+
+def errors(page_mm, nominal):
     design = np.c_[nominal, np.ones(len(nominal))]
     fit, *_ = np.linalg.lstsq(design, page_mm, rcond=None)
     scales = np.linalg.norm(fit[:2], axis=1)
@@ -121,8 +174,33 @@ def measured(image, dpi):
     return {
         "scale_ppm": [float(1e6 * (scale - 1)) for scale in scales],
         "rms_um": float(np.sqrt(np.mean(off**2))), "largest_um": float(np.hypot(*off.T).max()),
-        "corners": len(ids), "markers": len(markers),
     }
+
+
+def measured_mesh(path, stated, count):
+    """The same for the tags of a 3MF file, whether their cells are exact, and whether its bodies are closed."""
+    bodies = meshes.bodies(path)
+    face = path.with_suffix(".face.svg")
+    meshes.write_face(bodies, face)
+    image, dpi = by_cairo(face)
+    found = meshes.tags(image, dpi)
+    read = [tag for tag in stated if tag in found]
+    row = {"corners": 4 * len(read), "markers": len(read)}
+    if read:
+        places = np.vstack([found[tag][0] for tag in read])
+        row |= errors((places + 0.5) * 25.4 / dpi, np.vstack([stated[tag] for tag in read]))
+    return row | {
+        "tags_exact": len(read) == len(stated) and all(found[tag][1] for tag in read),
+        "closed": all(meshes.is_closed(triangles) for _, triangles, _ in bodies),
+        "by_own_detector": count(reduced(image, dpi)),
+    }
+
+
+def reduced(image, dpi):
+    """The page as a photograph would show it."""
+    scale = 75 / dpi
+    seen = cv2.copyMakeBorder(image, *[dpi // 2] * 4, cv2.BORDER_CONSTANT, value=255)
+    return cv2.resize(seen, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
 
 
 def main(deltille, folder):
@@ -132,12 +210,16 @@ def main(deltille, folder):
     for name, (pages, own) in GENERATORS.items():
         detect = own("charuco", folder / "boards")
         for way, image, dpi in pages(deltille, made):
-            # As a photograph would show it.
-            scale = 75 / dpi
-            seen = cv2.copyMakeBorder(image, *[dpi // 2] * 4, cv2.BORDER_CONSTANT, value=255)
-            seen = cv2.resize(seen, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-            table[f"{name}: {way}"] = measured(image, dpi) | {"by_own_detector": len(detect(seen))}
+            table[f"{name}: {way}"] = measured(image, dpi) | {"by_own_detector": len(detect(reduced(image, dpi)))}
             print(name, way, table[f"{name}: {way}"], flush=True)
+    for name, mesh in MESHES.items():
+        try:
+            path, stated, count = mesh(deltille, made)
+        except ImportError as error:
+            print(f"{name}: 3MF skipped, {error}")
+            continue
+        table[f"{name}: 3MF"] = measured_mesh(path, stated, count)
+        print(name, "3MF", table[f"{name}: 3MF"], flush=True)
     (folder / "prints.json").write_text(json.dumps(table))
 
 

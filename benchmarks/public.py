@@ -1,50 +1,55 @@
-"""Photographs of calibration targets by other people, with deltille and OpenCV side by side.
+"""Photographs of calibration targets by other people: which corners do detectors find, and how well do they fit a camera?
 
-    python public_photographs.py path/to/deltille FOLDER
+    python public.py path/to/deltille FOLDER       # writes FOLDER/public.json
 
-downloads public archives into FOLDER and detects the target in every photograph with both programs. Archives that
-cannot be downloaded are skipped; what is in FOLDER is not downloaded again. For each set it prints a row of a Markdown
-table: images with a detected target, corners, and the residuals of the corners that both programs found in the same place. They are those
-of OpenCV's camera calibration, or of a pose where the camera of the photograph is published; both programs' corners go
-through the same functions. Needs numpy, OpenCV 4.8 or later, and 400 MB of disk space.
+Downloads public archives into FOLDER/archives (220 MB); what is there is not downloaded again, and what cannot be downloaded is
+skipped. Nobody knows the true corners. A corner of a detector is elsewhere if it is more than 3 px from deltille's corner of the
+same label. Residuals are those of OpenCV's camera calibration, or of a pose where the camera of the photograph is published, over
+the corners that the detector and deltille have in common: one figure for the corners of each, by the same functions.
 """
 
 import fnmatch
 import json
+import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import tarfile
-import urllib.parse
 import urllib.request
 import zipfile
 
 import cv2
 import numpy as np
 
-from aprilgrid import by_opencv
+import detectors
+import measured
+import protocol
+import score
 
-ARUCO = cv2.aruco
-
-# Archives: a source distribution or a wheel of PyPI, a crate of crates.io, or the newest state of a GitHub repository.
+# A package of PyPI with the options of `pip download`, or an address. Nothing of them is part of this repository.
 ARCHIVES = {
-    "opencv": ("sdist", "opencv-contrib-python"),
-    "pose2sim": ("bdist_wheel", "pose2sim"),
-    "aprilgrid": ("crate", "aprilgrid-0.5.0"),
-    "intrinsic": ("crate", "camera-intrinsic-calibration-0.3.0"),
-    "ceres": ("github", "LimHaeryong/Camera-Calibration-using-Ceres-Solver"),
-    "stereo": ("github", "BakaAayush/Stereo-calibration"),
-    "boofcv": ("github", "lessthanoptimal/BoofCV-Data"),
+    # Apache 2.0.
+    "opencv": "opencv-contrib-python==5.1.0.95 --no-binary opencv-contrib-python",
+    # BSD 3-Clause.
+    "pose2sim": "pose2sim==0.10.49",
+    # MIT or Apache 2.0; its photograph is of TUM VI (CC BY 4.0).
+    "aprilgrid": "https://static.crates.io/crates/aprilgrid/aprilgrid-0.5.0.crate",
+    # GPL 3.0 or later; its photographs are of EuRoC MAV and TUM VI.
+    "intrinsic": "https://static.crates.io/crates/camera-intrinsic-calibration/camera-intrinsic-calibration-0.3.0.crate",
+    # Three repositories that state no licence; the last says that Peter Abeles owns its files.
+    "ceres": "https://codeload.github.com/LimHaeryong/Camera-Calibration-using-Ceres-Solver/tar.gz/HEAD",
+    "stereo": "https://codeload.github.com/BakaAayush/Stereo-calibration/tar.gz/HEAD",
+    "boofcv": "https://codeload.github.com/lessthanoptimal/BoofCV-Data/tar.gz/HEAD",
 }
 
 SAMPLES = "*/opencv/samples/data"
 TUTORIALS = "*/opencv/doc/tutorials/objdetect/charuco_detection/images"
-CHECKERS = {"kind": "checker", "rows": 6, "cols": 9}
-CHARUCO = {"kind": "charuco", "options": "--squares 5x7 --edge 40mm --marker 20mm --dictionary 6x6_250 --legacy"}
-APRILGRID = {"kind": "aprilgrid", "options": "--tags 6x6 --edge 88mm --gap 0.3"}
+CHARUCO = "charuco --squares 5x7 --edge 40mm --marker 20mm --dictionary 6x6_250 --legacy"
+APRILGRID = "aprilgrid --tags 6x6 --edge 88mm --gap 0.3"
 
-# Cameras as published with EuRoC MAV (cam0) and TUM VI (cam0): image size, fx, fy, cx, cy, and the distortion
-# of OpenCV's standard or fisheye model.
+# Cameras as published with EuRoC MAV (cam0) and TUM VI (cam0): fx, fy, cx, cy, and the distortion of OpenCV's standard or
+# fisheye model.
 EUROC = {"k": (458.654, 457.296, 367.215, 248.375), "d": (-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05)}
 TUM_VI = {
     "fisheye": True,
@@ -57,155 +62,120 @@ TUM_VI_LARGE = {
     "d": (0.010171079892421483, -0.010816440029919381, 0.005942781769412756, -0.001662284667857643),
 }
 
-# Name, archive, pattern of the photographs in it, target, camera.
+
+def checkers(rows, cols):
+    return f"checkerboard --rows {rows} --cols {cols} --edge 20mm"
+
+
+# Name, archive, pattern of the photographs in it, command that describes the board, camera.
 SETS = [
-    ("OpenCV samples, left camera", "opencv", f"{SAMPLES}/left[01][0-9].jpg", CHECKERS, None),
-    ("OpenCV samples, right camera", "opencv", f"{SAMPLES}/right[01][0-9].jpg", CHECKERS, None),
-    ("OpenCV test image", "opencv", "*/modules/java/*/chessboard.jpg", CHECKERS, None),
+    ("OpenCV samples, left camera", "opencv", f"{SAMPLES}/left[01][0-9].jpg", checkers(6, 9), None),
+    ("OpenCV samples, right camera", "opencv", f"{SAMPLES}/right[01][0-9].jpg", checkers(6, 9), None),
+    ("OpenCV test image", "opencv", "*/modules/java/*/chessboard.jpg", checkers(6, 9), None),
     ("OpenCV tutorial, ChArUco", "opencv", f"{TUTORIALS}/choriginal.jpg", CHARUCO, None),
     ("OpenCV tutorial, hidden ChArUco", "opencv", f"{TUTORIALS}/chocclusion_original.jpg", CHARUCO, None),
     ("EuRoC MAV, AprilGrid", "intrinsic", "*/data/euroc.png", APRILGRID, EUROC),
     ("TUM VI, AprilGrid, 512 px", "intrinsic", "*/data/tum_vi_with_chart.png", APRILGRID, TUM_VI),
     ("TUM VI, AprilGrid, 1024 px", "aprilgrid", "*/data/1520525725372653511.png", APRILGRID, TUM_VI_LARGE),
     *(
-        (f"Pose2Sim demonstration, camera {i}", "pose2sim", f"*/intrinsics/int_cam0{i}_img/*.jpg", {"kind": "checker", "rows": 4, "cols": 7}, None)
+        (f"Pose2Sim demonstration, camera {i}", "pose2sim", f"*/intrinsics/int_cam0{i}_img/*.jpg", checkers(4, 7), None)
         for i in range(1, 5)
     ),
-    ("L. Haeryong, wide webcam", "ceres", "*/resources/checkerboard/*.png", {"kind": "checker", "rows": 6, "cols": 8}, None),
-    ("B. Aayush, webcam", "stereo", "*/calibration_images/left_*.png", {"kind": "checker", "rows": 7, "cols": 10}, None),
-    ("BoofCV, Bumblebee2", "boofcv", "*/stereo/Bumblebee2_Chess/left*.jpg", {"kind": "checker", "rows": 4, "cols": 6}, None),
+    ("L. Haeryong, wide webcam", "ceres", "*/resources/checkerboard/*.png", checkers(6, 8), None),
+    ("B. Aayush, webcam", "stereo", "*/calibration_images/left_*.png", checkers(7, 10), None),
+    ("BoofCV, Bumblebee2", "boofcv", "*/stereo/Bumblebee2_Chess/left*.jpg", checkers(4, 6), None),
 ]
 
 # Corners farther from each other are different corners.
 SAME_PX = 3.0
-
-
-def address(kind, name):
-    if kind in ("sdist", "bdist_wheel"):
-        with urllib.request.urlopen(f"https://pypi.org/pypi/{name}/json", timeout=60) as answer:
-            release = json.load(answer)
-        link = next(file["url"] for file in release["urls"] if file["packagetype"] == kind)
-        return urllib.parse.urljoin(f"https://pypi.org/simple/{name}/", link)
-    if kind == "crate":
-        return f"https://static.crates.io/crates/{name.rsplit('-', 1)[0]}/{name}.crate"
-    return f"https://codeload.github.com/{name}/tar.gz/HEAD"
+# Fewer corners in a photograph do not contribute to residuals.
+LEAST = 8
+# Calls for each photograph: most sets have few photographs.
+CALLS = 3
 
 
 def fetched(folder, archive):
-    """The archive in the folder, downloaded if it is not there; `None` if that fails."""
-    path = folder / f"{archive}.archive"
+    """The archive, downloaded if it is not in the folder; None if that fails."""
+    path, source = folder / archive, ARCHIVES[archive]
     if not path.exists():
         part = path.with_suffix(".part")
+        part.mkdir(parents=True, exist_ok=True)
         try:
-            urllib.request.urlretrieve(address(*ARCHIVES[archive]), part)
-        except (OSError, StopIteration) as error:
-            print(f"{archive}: skipped, {error}", file=sys.stderr)
+            if source.startswith("https:"):
+                with urllib.request.urlopen(source, timeout=60) as answer, open(part / archive, "wb") as file:
+                    shutil.copyfileobj(answer, file)
+            else:
+                pip = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--dest", part]
+                subprocess.run([*pip, *source.split()], check=True)
+        except (OSError, subprocess.CalledProcessError) as error:
+            print(f"skipped: {archive}: {error}", flush=True)
             return None
         part.rename(path)
-    return path
+    return next(path.iterdir())
 
 
-def extracted(folder, archive, pattern):
-    """The files of an archive that match a pattern, in the order of their names."""
-    path = fetched(folder, archive)
-    if path is None:
-        return []
-    to = folder / "photographs" / archive
-    to.mkdir(parents=True, exist_ok=True)
+def extract(path, pattern, folder):
+    """Writes the files of an archive that match a pattern."""
+    folder.mkdir(parents=True, exist_ok=True)
     is_zip = zipfile.is_zipfile(path)
     with zipfile.ZipFile(path) if is_zip else tarfile.open(path) as files:
-        names = files.namelist() if is_zip else files.getnames()
-        chosen = sorted(name for name in names if fnmatch.fnmatch(name, pattern))
-        read = files.read if is_zip else lambda name: files.extractfile(name).read()
-        found = [to / name.replace("/", "_") for name in chosen]
-        for name, path in zip(chosen, found):
-            path.write_bytes(read(name))
-    return found
+        for name in fnmatch.filter(files.namelist() if is_zip else files.getnames(), pattern):
+            if is_zip or files.getmember(name).isfile():
+                content = files.read(name) if is_zip else files.extractfile(name).read()
+                (folder / pathlib.PurePosixPath(name).name).write_bytes(content)
 
 
-def run(*command):
-    done = subprocess.run([str(part) for part in command], capture_output=True, text=True)
-    assert done.returncode in (0, 1), f"{' '.join(map(str, command))}: {done.stderr}"
-
-
-def grey(path):
+def picture(path):
+    """A photograph as the file has it, except for 16 bits, which not every detector reads."""
     image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if image.dtype == np.uint16:
-        image = (image / (image.max() / 255)).astype(np.uint8)
-    return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if image.ndim == 3 else image
+    return (image / (image.max() / 255)).astype(np.uint8) if image.dtype == np.uint16 else image
 
 
-def ours(deltille, folder, images, target):
-    """Corners that deltille finds in each image, by id, and the positions of all corners on the target, mm."""
-    out = folder / "detections"
-    if target["kind"] == "checker":
-        rows, cols = target["rows"], target["cols"]
-        run(deltille, "detect", *images, "--grid", "checker", "--rows", rows, "--cols", cols, "-o", out, "--force")
-        key = lambda corner: corner["row"] * cols + corner["col"]
-        points = {r * cols + c: (float(c), float(r), 0.0) for r in range(rows) for c in range(cols)}
-        board = None
-    else:
-        run(deltille, target["kind"], *target["options"].split(), "--name", "board", "-o", folder, "--force", "--no-verify")
-        run(deltille, "detect", *images, "--target", folder / "board.json", "-o", out, "--force")
-        board = json.loads((folder / "board.json").read_text())
-        key = lambda corner: corner["id"]
-        points = {corner["id"]: corner["target_mm"] for corner in board["panels"][0]["corners"]}
-    found = []
-    for image in images:
-        detection = json.loads((out / f"{image.stem}.json").read_text())
-        grids = [grid["corners"] for grid in detection["grids"] if grid["panel"] == (None if board is None else 0)]
-        corners = max(grids, key=len, default=[])
-        found.append({key(c): np.array([c["x"], c["y"]]) for c in corners})
-    return found, points, board
+def one(folder, board, name):
+    """Detects the corners of all photographs of a set in this process, and prints them."""
+    cv2.setNumThreads(1)
+    # OpenCV's checkerboard detector draws random numbers.
+    cv2.setRNGSeed(1)
+    detector = next(of for of in detectors.ALL if of.name == name)
+    detect = detector(board, folder)
+    pictures = [picture(path) for path in sorted((folder / "photographs").iterdir())]
+    detect(pictures[0])
+    found, times = [], []
+    for image in pictures:
+        for _ in range(CALLS):
+            begin = measured.cpu_s()
+            corners = detect(image)
+            times.append(1e9 * (measured.cpu_s() - begin) / (image.shape[0] * image.shape[1]))
+        found.append([{"label": label, "x": float(x), "y": float(y)} for label, x, y, _ in corners])
+    print(json.dumps({"version": detector.version(), "photographs": found, "ms_per_mpx": float(np.median(times))}))
 
 
-def theirs(images, target, points, board):
-    """The same by OpenCV: for checkerboards, the better of its two detectors."""
-    found = []
-    for image in map(grey, images):
-        corners = {}
-        if target["kind"] == "checker":
-            size = (target["cols"], target["rows"])
-            is_found, places = cv2.findChessboardCornersSB(image, size, flags=cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY)
-            if not is_found:
-                is_found, places = cv2.findChessboardCorners(image, size)
-                if is_found:
-                    criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 100, 1e-4)
-                    places = cv2.cornerSubPix(image, places, (5, 5), (-1, -1), criteria)
-            if is_found:
-                corners = dict(enumerate(places.reshape(-1, 2)))
-        elif target["kind"] == "charuco":
-            spec = board["spec"]
-            dictionary = ARUCO.getPredefinedDictionary(getattr(ARUCO, spec["dictionary"]))
-            charuco = ARUCO.CharucoBoard(spec["squares"], spec["square_mm"], spec["marker_mm"], dictionary)
-            charuco.setLegacyPattern(spec["legacy"])
-            places, ids, _, _ = ARUCO.CharucoDetector(charuco).detectBoard(image)
-            if ids is not None:
-                corners = dict(zip(ids.ravel().tolist(), places.reshape(-1, 2)))
-        else:
-            columns, rows = board["spec"]["tags"]
-            grid = {"tagCols": columns, "tagRows": rows, "codeOffset": 0}
-            corners = by_opencv(image, grid, board["panels"][0], ARUCO.DICT_APRILTAG_36h11)
-            if corners:
-                # The window of the detector is too small to reach the saddle point from the corner of a contour.
-                criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 100, 1e-4)
-                places = np.float32(list(corners.values())).reshape(-1, 1, 2)
-                corners = dict(zip(corners, cv2.cornerSubPix(image, places, (4, 4), (-1, -1), criteria).reshape(-1, 2)))
-        found.append(corners)
-    return found
+def common(ours, theirs, count):
+    """Corners that both have, as pairs of theirs and ours, and the number of their corners that are elsewhere."""
+    pairs = score.labelled(ours, theirs) if ours and theirs else []
+    near = lambda a, b: b is not None and np.hypot(a["x"] - b["x"], a["y"] - b["y"]) < SAME_PX
+    same = [pair for pair in pairs if near(*pair)]
+    # Corners of labels that deltille lacks are unknown, unless it has the whole board.
+    known = sum(at is not None or len(ours) == count for _, at in pairs)
+    return same, known - len(same)
 
 
-def same_order(reference, corners, points):
-    """Renames corners of a checkerboard, which may begin at another of its outermost corners."""
-    if not reference or not corners:
-        return corners
-    ids = sorted(points)
-    width = 1 + int(max(point[0] for point in points.values()))
-    by_row = np.array(ids).reshape(-1, width)
-    ways = [by_row, by_row[::-1, ::-1], by_row[::-1], by_row[:, ::-1]]
-    renamed = [{int(to): corners[at] for at, to in zip(ids, way.ravel()) if at in corners} for way in ways]
-    distance = lambda way: np.median([np.hypot(*(way[i] - reference[i])) for i in way if i in reference])
-    return min(renamed, key=distance)
+def compared(ours, theirs, description, size, camera):
+    """Figures of a detector over the photographs of a set."""
+    target = {corner["id"]: corner["target_mm"] for corner in description["panels"][0]["corners"]}
+    pairs, elsewhere = zip(*(common(*of, len(target)) for of in zip(ours["photographs"], theirs["photographs"])))
+    key = lambda label: label["id"] if "id" in label else (label["row"], label["col"])
+    place = lambda label: target[label["id"]] if "id" in label else (label["col"], label["row"], 0)
+    points = {key(corner["label"]): place(corner["label"]) for found in ours["photographs"] for corner in found}
+
+    def rms(which):
+        views = [{key(pair[1]["label"]): (pair[which]["x"], pair[which]["y"]) for pair in of} for of in pairs if len(of) >= LEAST]
+        return float(np.sqrt(np.mean(residuals(views, size, points, camera) ** 2))) if views else None
+
+    return {
+        "images": sum(map(bool, theirs["photographs"])), "corners": sum(map(len, theirs["photographs"])),
+        "elsewhere": sum(elsewhere), "rms_px": rms(0), "deltille_rms_px": rms(1), "ms_per_mpx": theirs["ms_per_mpx"],
+    }
 
 
 def residuals(views, size, points, camera):
@@ -218,7 +188,8 @@ def residuals(views, size, points, camera):
             flags |= cv2.CALIB_FIX_PRINCIPAL_POINT | cv2.CALIB_FIX_ASPECT_RATIO | cv2.CALIB_ZERO_TANGENT_DIST
         criteria = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 1000, 1e-12)
         # Some initial focal lengths lead to a local minimum.
-        starts = [np.array([[f, 0, size[0] / 2 - 0.5], [0, f, size[1] / 2 - 0.5], [0, 0, 1]]) for f in max(size) * np.array([0.5, 1, 2])]
+        middle = [of / 2 - 0.5 for of in size]
+        starts = [np.array([[f, 0, middle[0]], [0, f, middle[1]], [0, 0, 1]]) for f in max(size) * np.array([0.5, 1, 2])]
         solved = [cv2.calibrateCamera(space, image, size, start, None, flags=flags, criteria=criteria) for start in starts]
         _, matrix, distortion, rotations, shifts = min(solved, key=lambda found: found[0])
         poses = [np.concatenate([r.ravel(), t.ravel()]) for r, t in zip(rotations, shifts)]
@@ -248,32 +219,39 @@ def off(pose, there, here, matrix, distortion, is_fisheye):
 
 
 def main(deltille, folder):
-    folder.mkdir(parents=True, exist_ok=True)
-    print("| photographs | images | corners due | deltille: images, corners | OpenCV | deltille: RMS error per axis, median distance, px | OpenCV |")
-    print("|---|---|---|---|---|---|---|")
-    for name, archive, pattern, target, camera in SETS:
-        images = extracted(folder, archive, pattern)
-        if not images:
+    table = []
+    for name, archive, pattern, command, camera in SETS:
+        path = fetched(folder / "archives", archive)
+        if path is None:
             continue
-        # OpenCV's checkerboard detector draws random numbers.
-        cv2.setRNGSeed(1)
-        own, points, board = ours(deltille, folder, images, target)
-        other = theirs(images, target, points, board)
-        if target["kind"] == "checker":
-            other = [same_order(a, b, points) for a, b in zip(own, other)]
-        both = [sorted(i for i in set(a) & set(b) if np.hypot(*(a[i] - b[i])) < SAME_PX) for a, b in zip(own, other)]
-        elsewhere = sum(len(set(a) & set(b)) for a, b in zip(own, other)) - sum(map(len, both))
-        used = [i for i, ids in enumerate(both) if len(ids) >= 8]
-        height, width = grey(images[0]).shape
-        words = ["", ""]
-        if used:
-            for who, found in enumerate((own, other)):
-                rest = residuals([{k: found[i][k] for k in both[i]} for i in used], (width, height), points, camera)
-                words[who] = f"{np.sqrt(np.mean(rest**2)):.3f}, {np.median(np.hypot(*rest.T)):.3f}"
-        counts = [f"{sum(map(bool, found))}, {sum(map(len, found))}" for found in (own, other)]
-        counts[1] += f" ({elsewhere} elsewhere)" if elsewhere else ""
-        print(f"| {name} | {len(images)} | {len(images) * len(points)} | {counts[0]} | {counts[1]} | {words[0]} | {words[1]} |", flush=True)
+        board, made = command.split()[0], folder / "public" / protocol.slug(name)
+        extract(path, pattern, made / "photographs")
+        photographs = sorted((made / "photographs").iterdir())
+        if not photographs:
+            print(f"skipped: {name}: no photographs in {path}", flush=True)
+            continue
+        describe = [deltille, *command.split(), "--name", board, "-o", made, "--force", "--no-verify"]
+        subprocess.run(describe, check=True, capture_output=True)
+        description = json.loads((made / f"{board}.json").read_text())
+        size = picture(photographs[0]).shape[1::-1]
+        due = len(photographs) * len(description["panels"][0]["corners"])
+        print(f"{name}, {len(photographs)} photographs", flush=True)
+        found = {of: measured.alone(__file__, of, made, board) for of in detectors.ALL if board in of.boards}
+        ours = found[detectors.Deltille]
+        for detector, theirs in found.items():
+            if ours is None or theirs is None:
+                continue
+            about = {"set": name, "photographs": len(photographs), "due": due, "detector": detector.name}
+            row = about | {"version": theirs["version"]} | compared(ours, theirs, description, size, camera)
+            table.append(row)
+            print(row, flush=True)
+    (folder / "public.json").write_text(json.dumps(table))
 
 
 if __name__ == "__main__":
-    main(pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]))
+    if sys.argv[1] == "--one":
+        one(pathlib.Path(sys.argv[2]), *sys.argv[3:])
+        # Without destructors, in which pupil-apriltags may crash.
+        sys.stdout.flush()
+        os._exit(0)
+    main(*(pathlib.Path(path).resolve() for path in sys.argv[1:3]))

@@ -26,12 +26,16 @@ def installed(folder):
     if not python.exists():
         subprocess.run([sys.executable, "-m", "venv", folder / "venv"], check=True)
     pip = [python, "-m", "pip", "install", "--quiet"]
+    # aprilcube asks for OpenCV 4, and works with 5.
+    alone = ["--no-deps", "aprilcube==0.3.1"]
     lines = (HERE / "requirements.txt").read_text().splitlines()
     packages = [line for line in lines if line and not line.startswith("#")]
     if subprocess.run([*pip, *packages]).returncode != 0:
         for package in packages:
             if subprocess.run([*pip, package]).returncode != 0:
                 print(f"not installed: {package}")
+    if subprocess.run([*pip, *alone]).returncode != 0:
+        print("not installed: aprilcube")
     subprocess.run([*pip, PROJECT], check=True)
     return python
 
@@ -42,7 +46,8 @@ def main():
     parser.add_argument("--seed", type=int, default=protocol.SEED)
     parser.add_argument("--scene", nargs="*", choices=protocol.SCENES, metavar="NAME", help=", ".join(protocol.SCENES))
     parser.add_argument("--board", nargs="*", choices=protocol.BOARDS)
-    parser.add_argument("--fisheye", type=pathlib.Path, help="folder with the photographs `fisheye` of the paper's data set")
+    parser.add_argument("--paper", type=pathlib.Path, help="the paper's data set: a folder with `fisheye` and `robot-hand`")
+    parser.add_argument("--reference", type=pathlib.Path, help="the paper's detector, see detectors.py, class Reference")
     parser.add_argument("--write", action="store_true", help="replace the tables of docs/benchmarks.md, the plot and results.json")
     parser.add_argument("--python", type=pathlib.Path, help="an interpreter that has the packages; nothing is installed")
     parser.add_argument("--program", type=pathlib.Path, help="the program deltille [default: it is built]")
@@ -57,13 +62,17 @@ def main():
         program = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", PROJECT / "target")) / "release/deltille"
     chosen = [part for name in ("scene", "board") if (of := getattr(given, name)) for part in (f"--{name}", *of)]
     script = lambda name, *arguments: subprocess.run([python, HERE / f"{name}.py", *map(str, arguments)], check=True)
+    if given.reference:
+        os.environ["REFERENCE_DETECTOR"] = str(given.reference.resolve())
     script("photographs", program, folder, "--seed", given.seed, *chosen)
     script("measured", folder)
     if not chosen:
         script("cameras", folder)
         script("prints", program, folder)
-    if given.fisheye:
-        script("fisheye", program, folder, given.fisheye.resolve())
+        script("fixtures", program, folder)
+        script("public", program, folder)
+    if given.paper:
+        script("paper", program, folder, given.paper.resolve())
     done = subprocess.run([python, HERE / "tables.py", folder, *(["--write"] if given.write else [])])
     sys.exit(done.returncode)
 
