@@ -62,6 +62,14 @@ impl ImageView<'_> {
         of_any!(self, view => of(view))
     }
 
+    /// Returns the standard deviation of rounding to whole values, as a fraction of white; 0 for floats.
+    pub fn rounding_sd(&self) -> f64 {
+        match self {
+            Self::F32(_) => 0.0,
+            _ => 1.0 / (12f64.sqrt() * f64::from(self.full_scale())),
+        }
+    }
+
     /// Interpolates bilinearly at (x, y); positions outside get the nearest border value. An empty image gives 0.
     #[inline]
     pub fn bilinear(&self, x: f64, y: f64) -> f32 {

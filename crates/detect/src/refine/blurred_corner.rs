@@ -57,6 +57,8 @@ pub(crate) struct Shade<const K: usize> {
     pub shifts: [f32; K],
     /// Derivatives with respect to half of the motion across each edge; 0 without motion.
     pub way: [f32; K],
+    /// Derivatives with respect to the strengths of [`WithPixel`]; 0 without it.
+    pub boxed: [f32; K],
 }
 
 /// Pairs of edges.
@@ -126,7 +128,68 @@ impl<const K: usize, P: Pattern<K>> Pattern<K> for Haloed<P> {
             halo: sharp.f - wide.f,
             shifts: std::array::from_fn(|k| both(sharp.shifts[k], wide.shifts[k] * self.narrower)),
             way: std::array::from_fn(|k| both(sharp.way[k], wide.way[k] * self.narrower)),
+            boxed: std::array::from_fn(|k| {
+                both(sharp.boxed[k], wide.boxed[k] * self.narrower.powi(4))
+            }),
         }
+    }
+}
+
+/// Edges under a Gaussian convolved with the box of a pixel, by the next term of Edgeworth's series: c (h³ − 3h) times the
+/// slope of the edge, for the strength c of the term.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct WithPixel<P, const K: usize> {
+    /// The edges under the Gaussian.
+    pub edges: P,
+    /// c of each edge.
+    pub strengths: [f32; K],
+}
+
+impl<P, const K: usize> WithPixel<P, K> {
+    /// Returns the same box at lengths that are multiplied by a factor.
+    pub(crate) fn scaled(self, factor: f32) -> Self {
+        Self { strengths: self.strengths.map(|c| c * factor.powi(4)), ..self }
+    }
+}
+
+impl Pattern<3> for WithPixel<Deltille, 3> {
+    const CORRELATED: usize = 0;
+
+    #[inline(always)]
+    fn at(&self, h: [f32; 3]) -> Shade<3> {
+        let mut shade = self.edges.at(h);
+        for (k, h) in h.into_iter().enumerate() {
+            let (square, slope) = (h * h, shade.slopes[k]);
+            shade.boxed[k] = h * (square - 3.0) * slope;
+            shade.f += self.strengths[k] * shade.boxed[k];
+            shade.slopes[k] -= self.strengths[k] * ((square - 6.0) * square + 3.0) * slope;
+        }
+        shade
+    }
+}
+
+impl<const NODES: usize> Pattern<2> for WithPixel<Orthant<NODES>, 2> {
+    const CORRELATED: usize = 1;
+
+    #[inline(always)]
+    fn at(&self, h: [f32; 2]) -> Shade<2> {
+        let still = self.edges.checker(h);
+        let mut shade = still;
+        // The slope of an edge changes by `mixed` with the distance from the other.
+        let Orthant { rho, sine, .. } = self.edges;
+        let mixed = still.correlations[0];
+        for k in 0..2 {
+            let (square, slope) = (h[k] * h[k], still.slopes[k]);
+            let cubic = h[k] * (square - 3.0);
+            let by_other = self.strengths[k] * cubic * mixed;
+            shade.boxed[k] = cubic * slope;
+            shade.f += self.strengths[k] * shade.boxed[k];
+            shade.slopes[k] -=
+                self.strengths[k] * ((square - 6.0) * square + 3.0) * slope + rho * by_other;
+            shade.slopes[1 - k] += by_other;
+            shade.correlations[0] -= by_other * (h[k] - rho * h[1 - k]) / (sine * sine);
+        }
+        shade
     }
 }
 
@@ -177,6 +240,7 @@ impl Pattern<3> for SweptDeltille {
             halo: 0.0,
             shifts: [0.0; 3],
             way: [way1, -way2, way3],
+            boxed: [0.0; 3],
         }
     }
 }
@@ -207,6 +271,7 @@ impl<P: Pattern<2>> Pattern<2> for SweptChecker<P> {
             correlations: mean(outer.correlations, inner.correlations),
             shifts: mean(outer.shifts, inner.shifts),
             way: mean(outer.way, inner.way),
+            boxed: mean(outer.boxed, inner.boxed),
             ..outer
         }
     }
@@ -224,6 +289,7 @@ impl<P: Pattern<2>> SweptChecker<P> {
             slopes: mean(behind.slopes, ahead.slopes),
             correlations: mean(behind.correlations, ahead.correlations),
             shifts: mean(behind.shifts, ahead.shifts),
+            boxed: mean(behind.boxed, ahead.boxed),
             way: [
                 0.5 * part * (ahead.slopes[0] - behind.slopes[0]),
                 0.5 * part * (ahead.slopes[1] - behind.slopes[1]),
@@ -247,6 +313,7 @@ fn deltille([h1, h2, h3]: [f32; 3]) -> Shade<3> {
         halo: 0.0,
         shifts: [0.0; 3],
         way: [0.0; 3],
+        boxed: [0.0; 3],
     }
 }
 
@@ -307,6 +374,7 @@ impl<const NODES: usize> Orthant<NODES> {
             halo: 0.0,
             shifts: [0.0; 2],
             way: [0.0; 2],
+            boxed: [0.0; 2],
         }
     }
 
@@ -421,8 +489,23 @@ mod tests {
                 let (up, down) = (deltille(moved(step)).f, deltille(moved(-step)).f);
                 close(deltille(h).slopes[k], up, down, 2.0 * step);
             }
+            let three = WithPixel { edges: Deltille, strengths: [0.1, 0.05, 0.02] };
+            for k in 0..3 {
+                let moved = |by: f32| std::array::from_fn(|j| h[j] + if j == k { by } else { 0.0 });
+                let (up, down) = (three.at(moved(step)).f, three.at(moved(-step)).f);
+                close(three.at(h).slopes[k], up, down, 2.0 * step);
+            }
             let orthant = Orthant::new(rho);
             let h = [h[0], h[1]];
+            let two = |rho: f64| WithPixel { edges: Orthant::new(rho), strengths: [0.1, 0.05] };
+            for k in 0..2 {
+                let moved = |by: f32| std::array::from_fn(|j| h[j] + if j == k { by } else { 0.0 });
+                let (up, down) = (two(rho).at(moved(step)).f, two(rho).at(moved(-step)).f);
+                close(two(rho).at(h).slopes[k], up, down, 2.0 * step);
+            }
+            let quotient = (two(rho + 0.01).at(h).f - two(rho - 0.01).at(h).f) / 0.02;
+            let derivative = two(rho).at(h).correlations[0];
+            assert!((derivative - quotient).abs() < 1e-2 * derivative.abs().max(0.1));
             for k in 0..2 {
                 let moved = |by: f32| std::array::from_fn(|j| h[j] + if j == k { by } else { 0.0 });
                 let (up, down) = (orthant.checker(moved(step)).f, orthant.checker(moved(-step)).f);

@@ -178,7 +178,8 @@ impl<P: Pattern<2>> Pattern<2> for Parted<P> {
             shifts[k] -= 0.5 * (steep + flat);
         }
         let correlation = 0.5 * (ahead.correlations[0] + behind.correlations[0]);
-        Shade { f, slopes, correlations: [correlation, 0.0, 0.0], shifts, ..ahead }
+        let boxed = mean(ahead.boxed, behind.boxed);
+        Shade { f, slopes, correlations: [correlation, 0.0, 0.0], shifts, boxed, ..ahead }
     }
 }
 

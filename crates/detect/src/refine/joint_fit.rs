@@ -186,7 +186,9 @@ impl<const K: usize> Problem<'_, K> {
         let information = inverse.unwrap_or_else(|| DMatrix::zeros(active.len(), active.len()));
         let kappa_slopes = [0, 1, 2].map(|p| optics.kappa_slope(self.greys, p));
         let pixels = self.members.iter().map(|member| member.patch.window.count()).sum();
-        Estimate { vector, active, information, kappa_slopes, pixels }
+        let blurs = self.members.iter().map(|member| member.corner.blur_px).collect();
+        let blur_px = median(blurs).unwrap_or(0.0);
+        Estimate { vector, active, information, kappa_slopes, pixels, blur_px }
     }
 
     /// Returns the estimated ink spread; `None` if it was not estimated.

@@ -20,6 +20,10 @@ const CHI2_OF_ONE: f64 = 10.8;
 /// Effect, as a fraction of the noise, above which a curve that displaces no corner is used.
 const NOTICED: f64 = 0.05;
 
+/// Blur below which the profile of an edge is mostly the box of a pixel, which the model approximates. The error of the
+/// approximation resembles the part of a curve that is not κ₀, and would move edges along rows and columns by up to 0.07 px.
+const SHARPEST_PX: f64 = 0.35;
+
 /// Values of all parameters, with the information about the active ones.
 pub(super) struct Estimate {
     pub(super) vector: [f64; PARAMS],
@@ -28,8 +32,9 @@ pub(super) struct Estimate {
     pub(super) information: DMatrix<f64>,
     /// Derivatives of κ₀ with respect to the parameters of the curve.
     pub(super) kappa_slopes: [f64; TONE_PARAMS],
-    /// Number of pixels in the windows of the corners.
+    /// Number of pixels in the windows of the corners, and their median blur, px.
     pub(super) pixels: usize,
+    pub(super) blur_px: f64,
 }
 
 impl Estimate {
@@ -55,7 +60,8 @@ impl Estimate {
     /// Returns the evidence against a group being zero, in squared standard deviations.
     ///
     /// The part of a curve other than κ₀ displaces no corner. It occurs in every image whose blur
-    /// differs a little from the model. It counts if it is more than a twentieth of the noise.
+    /// differs a little from the model. It counts if it is more than a twentieth of the noise, and the image is not as sharp
+    /// as its pixels.
     fn evidence(&self, group: &[usize]) -> f64 {
         let places = |inside: bool| -> Vec<usize> {
             let all = 0..self.active.len();
@@ -78,6 +84,7 @@ impl Estimate {
         let Some(factor) = information.cholesky() else { return 0.0 };
         let of_kappa = slopes.dot(&value).powi(2) / slopes.dot(&factor.solve(&slopes));
         let of_noise = chi2 / (NOTICED * self.pixels as f64);
+        let of_noise = if self.blur_px < SHARPEST_PX { 0.0 } else { of_noise };
         CHI2[0] * (of_kappa / CHI2_OF_ONE).max(of_noise)
     }
 

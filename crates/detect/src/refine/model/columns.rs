@@ -8,7 +8,7 @@ use super::look::Look;
 use super::window::{MAX_PIXELS, Window};
 use crate::refine::blurred_corner::{
     Deltille, FEW_NODES_RHO, Orthant, PAIRS, Pattern, Shade, SweptChecker, SweptDeltille,
-    edge_slope,
+    WithPixel, edge_slope,
 };
 use crate::refine::displaced_edges::WithSpot;
 use deltille_core::detection::TONE_PARAMS;
@@ -66,7 +66,7 @@ pub(super) fn fill_columns<const K: usize, const JOINT: bool>(
                 let way = std::array::from_fn(|k| way.get(k).copied().unwrap_or(0.0));
                 fill_swept_deltille::<K, JOINT>(columns, shown, window, corner, look, way);
             }
-            (None, true) => match look.with_spot(Deltille, 1.0) {
+            (None, true) => match look.with_spot(look.with_pixel(Deltille), 1.0) {
                 Some(near) => {
                     fill_spot_deltille::<K, JOINT>(columns, shown, window, corner, look, near);
                 }
@@ -85,9 +85,10 @@ fn fill_checker<const C: usize, const JOINT: bool>(
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
-    let still = Orthant::new(look.correlations[0].rho);
+    let still = look.with_pixel(Orthant::new(look.correlations[0].rho));
     if look.has_halo() {
-        fill::<2, C, JOINT, _>(columns, shown, window, corner, look, look.haloed(still));
+        let pattern = look.haloed_of(|by| still.scaled(by));
+        fill::<2, C, JOINT, _>(columns, shown, window, corner, look, pattern);
     } else {
         fill::<2, C, JOINT, _>(columns, shown, window, corner, look, still);
     }
@@ -101,9 +102,10 @@ fn fill_square<const C: usize, const JOINT: bool>(
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
-    let still = Orthant::of_few_nodes(look.correlations[0].rho);
+    let still = look.with_pixel(Orthant::of_few_nodes(look.correlations[0].rho));
     if look.has_halo() {
-        fill::<2, C, JOINT, _>(columns, shown, window, corner, look, look.haloed(still));
+        let pattern = look.haloed_of(|by| still.scaled(by));
+        fill::<2, C, JOINT, _>(columns, shown, window, corner, look, pattern);
     } else {
         fill::<2, C, JOINT, _>(columns, shown, window, corner, look, still);
     }
@@ -118,7 +120,7 @@ fn fill_any_checker<const C: usize, const JOINT: bool>(
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
-    let still = Orthant::new(look.correlations[0].rho);
+    let still = look.with_pixel(Orthant::new(look.correlations[0].rho));
     fill_any::<C, JOINT, 6>(columns, shown, window, corner, look, still);
 }
 
@@ -131,7 +133,7 @@ fn fill_any_square<const C: usize, const JOINT: bool>(
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
-    let still = Orthant::of_few_nodes(look.correlations[0].rho);
+    let still = look.with_pixel(Orthant::of_few_nodes(look.correlations[0].rho));
     fill_any::<C, JOINT, 3>(columns, shown, window, corner, look, still);
 }
 
@@ -142,12 +144,12 @@ fn fill_any<const C: usize, const JOINT: bool, const NODES: usize>(
     window: &Window,
     corner: &Corner<C>,
     look: &Look<C>,
-    still: Orthant<NODES>,
+    still: WithPixel<Orthant<NODES>, 2>,
 ) {
     let has_halo = JOINT || look.has_halo();
     let Some(way) = look.way.map(|way| [way[0], way[1]]) else {
         if has_halo {
-            let pattern = look.haloed_of(|by| look.parted(still, by));
+            let pattern = look.haloed_of(|by| look.parted(still.scaled(by), by));
             fill::<2, C, JOINT, _>(columns, shown, window, corner, look, pattern);
         } else {
             let pattern = look.parted(still, 1.0);
@@ -155,8 +157,10 @@ fn fill_any<const C: usize, const JOINT: bool, const NODES: usize>(
         }
         return;
     };
-    let swept =
-        |by: f32| SweptChecker { pattern: look.parted(still, by), way: [way[0] * by, way[1] * by] };
+    let swept = |by: f32| SweptChecker {
+        pattern: look.parted(still.scaled(by), by),
+        way: [way[0] * by, way[1] * by],
+    };
     if has_halo {
         fill::<2, C, JOINT, _>(columns, shown, window, corner, look, look.haloed_of(swept));
     } else {
@@ -172,9 +176,10 @@ fn fill_deltille<const C: usize, const JOINT: bool>(
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
-    let still = Deltille;
+    let still = look.with_pixel(Deltille);
     if JOINT || look.has_halo() {
-        fill::<3, C, JOINT, _>(columns, shown, window, corner, look, look.haloed(still));
+        let pattern = look.haloed_of(|by| still.scaled(by));
+        fill::<3, C, JOINT, _>(columns, shown, window, corner, look, pattern);
     } else {
         fill::<3, C, JOINT, _>(columns, shown, window, corner, look, still);
     }
@@ -188,9 +193,11 @@ fn fill_inked_deltille<const C: usize, const JOINT: bool>(
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
-    let inked = look.with_triangle(Deltille);
+    let still = look.with_pixel(Deltille);
+    let inked = look.with_triangle(still);
     if JOINT || look.has_halo() {
-        fill::<3, C, JOINT, _>(columns, shown, window, corner, look, look.haloed(inked));
+        let inked = |by: f32| look.with_triangle(still.scaled(by));
+        fill::<3, C, JOINT, _>(columns, shown, window, corner, look, look.haloed_of(inked));
     } else {
         fill::<3, C, JOINT, _>(columns, shown, window, corner, look, inked);
     }
@@ -203,11 +210,12 @@ fn fill_spot_deltille<const C: usize, const JOINT: bool>(
     window: &Window,
     corner: &Corner<C>,
     look: &Look<C>,
-    near: WithSpot<Deltille>,
+    near: WithSpot<WithPixel<Deltille, 3>>,
 ) {
     if JOINT || look.has_halo() {
         // The halo is wider than the blur, so its spot is relatively smaller.
-        let spot = |by: f32| look.with_spot(Deltille, by).unwrap_or(near);
+        let still = look.with_pixel(Deltille);
+        let spot = |by: f32| look.with_spot(still.scaled(by), by).unwrap_or(near);
         fill::<3, C, JOINT, _>(columns, shown, window, corner, look, look.haloed_of(spot));
     } else {
         fill::<3, C, JOINT, _>(columns, shown, window, corner, look, near);
@@ -269,6 +277,8 @@ fn fill<const K: usize, const C: usize, const JOINT: bool, P: Pattern<K>>(
     let skewness_by_turn: [f32; K] = std::array::from_fn(|k| look.skewness_by_turn[k] as f32);
     let by_skewness: [[f32; K]; 2] =
         [0, 1].map(|e| std::array::from_fn(|k| look.by_skewness[e][k] as f32));
+    let pixel_by_sharpness: [f32; K] = std::array::from_fn(|k| look.pixel[k].by_sharpness as f32);
+    let pixel_by_turn: [f32; K] = std::array::from_fn(|k| look.pixel[k].by_turn as f32);
     let way_by_turn: [f32; K] = std::array::from_fn(|k| look.way_by_turn[k] as f32);
     let way_by_shape: [[f32; K]; 3] =
         [0, 1, 2].map(|e| std::array::from_fn(|k| look.way_by_shape[e][k] as f32));
@@ -289,8 +299,8 @@ fn fill<const K: usize, const C: usize, const JOINT: bool, P: Pattern<K>>(
         let h: [f32; K] = std::array::from_fn(|k| {
             cosines[k] * dv - sines[k] * du - 0.5 * bends[k] * along[k] * along[k] - moved[k]
         });
-        let Shade { mut f, mut slopes, correlations, halo, shifts, way } = pattern.at(h);
-        // The next term of Edgeworth's series of each of three edges.
+        let Shade { mut f, mut slopes, correlations, halo, shifts, way, boxed } = pattern.at(h);
+        // The term of Edgeworth's series for the skewness of each of three edges.
         let mut skewed = [0.0; K];
         if K == 3 {
             for k in 0..K {
@@ -316,20 +326,24 @@ fn fill<const K: usize, const C: usize, const JOINT: bool, P: Pattern<K>>(
         let seen = if model > low && model < high { 1.0 } else { 0.0 };
         let by_shade = amplitude * steepness * seen;
         let light = by_shade * gain;
+        // The derivatives with respect to the logarithm of the blur across each edge, with opposite sign.
+        let mut narrowed = [0.0; K];
         for k in 0..K {
             let bent = bends[k] * along[k];
             by_x += slopes[k] * (sines[k] + bent * cosines[k]);
             by_y -= slopes[k] * (cosines[k] - bent * sines[k]);
-            // The derivative with respect to the logarithm of the blur across this edge, with opposite sign.
-            let narrowed =
-                if K == 3 { slopes[k] * h[k] } else { slopes[k] * h[k] + shifts[k] * parted[k] };
-            by_scale -= narrowed;
+            narrowed[k] = slopes[k] * h[k] + pixel_by_sharpness[k] * boxed[k];
+            if K == 2 {
+                narrowed[k] += shifts[k] * parted[k];
+            }
+            by_scale -= narrowed[k];
             let across = cosines[k] * dv - sines[k] * du;
-            let mut by = -slopes[k] * (along[k] + bent * across) - narrowed * by_turn[k];
+            let mut by = -slopes[k] * (along[k] + bent * across) - narrowed[k] * by_turn[k];
             for p in 0..P::CORRELATED {
                 by += correlations[p] * rho_by_angle[p][k];
             }
-            let by = by + way[k] * way_by_turn[k] + skewed[k] * skewness_by_turn[k];
+            by += way[k] * way_by_turn[k] + skewed[k] * skewness_by_turn[k];
+            by += boxed[k] * pixel_by_turn[k];
             columns[ANGLE + k][i] = light * by;
         }
         let by_light = by_shade * (f + piece.ratio);
@@ -360,7 +374,7 @@ fn fill<const K: usize, const C: usize, const JOINT: bool, P: Pattern<K>>(
                     by += correlations[p] * rho_by_shape[p][e];
                 }
                 for k in 0..K {
-                    by -= (slopes[k] * h[k] + shifts[k] * parted[k]) * by_shape[e][k];
+                    by -= narrowed[k] * by_shape[e][k];
                     by += way[k] * way_by_shape[e][k];
                     by -= 3.0 * skewness[k] * skewed[k] * by_shape[e][k];
                 }

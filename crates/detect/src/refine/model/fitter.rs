@@ -58,7 +58,7 @@ const ROUGHLY_SAME_LIGHT: f64 = 0.1;
 const ARM_PX: f64 = 3.0;
 
 /// Minimum assumed noise, relative to the amplitude, so that noiseless images converge too.
-pub(super) const MIN_NOISE: f64 = 2e-5;
+const MIN_NOISE: f64 = 2e-5;
 
 /// Maximum distance of a corner from its start, px; the start is the result of the polynomial.
 pub(crate) const MAX_WAY_PX: f64 = 1.5;
@@ -110,6 +110,8 @@ pub(crate) struct CornerFitter {
     /// Values at which the sensor clipped pixels of the window, or infinite values if it clipped
     /// none.
     pub(super) limits: [f32; 2],
+    /// Standard deviation of the rounding of pixels: without noise, rounding errors are still unknown.
+    rounding: f64,
     /// Effect of the borders of tags.
     beside: Box<Beside>,
 }
@@ -120,6 +122,7 @@ impl Default for CornerFitter {
             pixels: Box::new([0.0; MAX_PIXELS]),
             columns: Box::new([[0.0; MAX_PIXELS]; ALL]),
             limits: UNLIMITED,
+            rounding: 0.0,
             beside: Box::default(),
         }
     }
@@ -179,7 +182,7 @@ impl CornerFitter {
         let mut normal = self.normal(window, &corner, optics, piece);
         let mut converged = false;
         for evaluations in 1..MAX_EVALUATIONS {
-            let noise = noise(&normal, &corner, freedom);
+            let noise = self.noise(normal.cost / freedom, &corner);
             let (mut matrix, mut gradient) = with_prior(&normal, &corner, noise);
             if corner.blur_px <= MIN_BLUR_PX && gradient[LN_BLUR] < 0.0 {
                 // The blur is at its minimum.
@@ -234,7 +237,7 @@ impl CornerFitter {
                 damping.stiffen();
             }
         }
-        let noise = noise(&normal, &corner, freedom);
+        let noise = self.noise(normal.cost / freedom, &corner);
         let matrix = with_prior(&normal, &corner, noise).0;
         let rows = std::array::from_fn::<[f64; PARAMS + 2], PARAMS, _>(|i| {
             std::array::from_fn(|j| match j.checked_sub(PARAMS) {
@@ -271,6 +274,7 @@ impl CornerFitter {
     ) -> Option<DVec2> {
         let centre = position.round();
         window.read(image, centre, &mut self.pixels)?;
+        self.rounding = image.rounding_sd();
         let (low, high) = ends(&self.pixels[..window.count]);
         self.limits = [
             if low <= 0.0 { low } else { UNLIMITED[0] },
@@ -294,6 +298,11 @@ impl CornerFitter {
     ) -> Option<&[f32]> {
         self.load(image, window, position)?;
         Some(&self.pixels[..window.count])
+    }
+
+    /// Returns the noise of the loaded pixels, given the mean square of the residuals.
+    pub(super) fn noise<const K: usize>(&self, mean_square: f64, corner: &Corner<K>) -> f64 {
+        mean_square.sqrt().max(self.rounding).max(MIN_NOISE * corner.amplitude.abs())
     }
 
     /// Returns von Neumann's ratio of the residuals along the rows: 1 for white noise.
@@ -357,11 +366,6 @@ fn is_within(step: &SVector<f64, PARAMS>, limit: f64) -> bool {
     step[X].hypot(step[Y]) < limit
         && step[LN_BLUR].abs() < limit
         && step.iter().skip(ANGLE).all(|turn| turn.abs() < limit / ARM_PX)
-}
-
-/// Returns the noise of the residuals.
-pub(super) fn noise<const K: usize>(normal: &Normal, corner: &Corner<K>, freedom: f64) -> f64 {
-    (normal.cost / freedom).sqrt().max(MIN_NOISE * corner.amplitude.abs())
 }
 
 /// Returns the normal equations with the prior on the slopes.
@@ -498,6 +502,44 @@ mod tests {
             check::<2>(&corner(amplitude), optics, &[]);
             check::<2>(&corner(amplitude), optics, &borders());
             check::<3>(&corner(amplitude), optics, &[]);
+        }
+    }
+
+    /// Brightness of an edge at a distance under a box of 1 px and a Gaussian of this standard deviation, −1 to 1.
+    fn boxed(distance: f64, sigma: f64) -> f64 {
+        let integral = |h: f64| {
+            let bell = (-0.5 * (h / sigma).powi(2)).exp();
+            let erf = libm::erf(h / sigma * std::f64::consts::FRAC_1_SQRT_2);
+            h * erf + (2.0 / std::f64::consts::PI).sqrt() * sigma * bell
+        };
+        integral(distance + 0.5) - integral(distance - 0.5)
+    }
+
+    /// Edges along rows and columns show the box of a pixel most.
+    #[test]
+    fn sharp_edges_along_rows_and_columns_do_not_depend_on_their_place_in_the_pixel() {
+        const MIDDLE: f64 = 12.0;
+        for (sigma, most) in [(0.01, 0.02), (0.15, 0.004), (0.3, 0.002), (0.5, 0.001)] {
+            for (i, j) in (0..=8).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+                let [dx, dy] = [i, j].map(|step| f64::from(step) / 16.0);
+                let edge = |at: usize, from: f64| boxed(at as f64 - MIDDLE - from, sigma);
+                let grey = |x, y| (0.5 + 0.35 * edge(x, dx) * edge(y, dy)) as f32;
+                let picture = Gray::from_fn(25, 25, grey);
+                let start = Corner {
+                    position: DVec2::splat(MIDDLE),
+                    blur_px: 0.6,
+                    slope: DVec2::ZERO,
+                    angles: [0.02, 0.02 + std::f64::consts::FRAC_PI_2],
+                    bends: [0.0; 2],
+                    ..corner(-0.3)
+                };
+                let mut fitter = CornerFitter::default();
+                let (window, optics) = (Window::new(6), Optics::default());
+                let image = (&picture).into();
+                let found = fitter.fit(image, &window, &start, &optics, Accuracy::Full);
+                let off = found.expect("a corner").corner.position - (DVec2::new(dx, dy) + MIDDLE);
+                assert!(off.length() < most, "{sigma} px, {dx} {dy}: {off}");
+            }
         }
     }
 }

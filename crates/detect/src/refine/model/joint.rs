@@ -4,7 +4,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::columns::{ALL, HALO, INK, RISE, SHADE, SHAPE, SKEWNESS, TONE};
 use super::corner::{ANGLE, Corner, OWN, PARAMS, SLOPE, X, Y};
-use super::fitter::{CornerFitter, MIN_NOISE, SLOPE_PRIOR, noise, with_prior};
+use super::fitter::{CornerFitter, SLOPE_PRIOR, with_prior};
 use super::sums::products;
 use super::window::Patch;
 use crate::refine::correlation::Influence;
@@ -101,8 +101,7 @@ impl CornerFitter {
             }
         }
         let cost = product(PARAMS, PARAMS);
-        let noise = (cost / (window.count - params) as f64).sqrt();
-        let noise = noise.max(MIN_NOISE * corner.amplitude.abs());
+        let noise = self.noise(cost / (window.count - params) as f64, &corner);
         let weight = (noise / SLOPE_PRIOR).powi(2);
         for (i, slope) in corner.slope.to_array().iter().enumerate() {
             matrix[(SLOPE + i, SLOPE + i)] += weight;
@@ -126,7 +125,7 @@ impl CornerFitter {
         let piece = optics.piece(corner.level, corner.amplitude);
         let normal = self.normal(window, &corner, optics, piece);
         let freedom = (window.count - (ANGLE + K)) as f64;
-        let noise = noise(&normal, &corner, freedom);
+        let noise = self.noise(normal.cost / freedom, &corner);
         let factor = with_prior(&normal, &corner, noise).0.cholesky()?;
         let inverse = factor.inverse();
         let root = factor.l().try_inverse()?;

@@ -1,7 +1,7 @@
 //! Effect of the optics on a corner: the same for all of its pixels, and computed once.
 
-use super::corner::Corner;
-use crate::refine::blurred_corner::{Haloed, Orthant, PAIRS};
+use super::corner::{Corner, MIN_BLUR_PX};
+use crate::refine::blurred_corner::{Haloed, Orthant, PAIRS, WithPixel};
 use crate::refine::displaced_edges::{Parted, WithSpot, WithTriangle};
 use crate::refine::optics::{INK_UNIT, Optics};
 use deltille_core::detection::Piece;
@@ -24,6 +24,8 @@ pub(super) struct Look<const K: usize> {
     pub(super) skewness: [f64; K],
     pub(super) skewness_by_turn: [f64; K],
     pub(super) by_skewness: [[f64; K]; 2],
+    /// Deviation of a pixel's box from a Gaussian, across each edge.
+    pub(super) pixel: [PixelBox; K],
     /// Tone curve between black and white.
     pub(super) piece: Piece,
     /// Strength of the halo, and its width relative to the blur.
@@ -53,6 +55,37 @@ pub(super) struct Correlation {
     pub(super) by_shape: [f64; 3],
 }
 
+/// The strength of [`WithPixel`] across an edge.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PixelBox {
+    /// c.
+    pub(super) strength: f64,
+    /// −∂c/∂ln s_k, and ∂c/∂θ_k at constant s_k.
+    pub(super) by_sharpness: f64,
+    pub(super) by_turn: f64,
+}
+
+impl PixelBox {
+    const NONE: Self = Self { strength: 0.0, by_sharpness: 0.0, by_turn: 0.0 };
+
+    /// The factor of 1/s² in [`Self::of`], px².
+    const STRONGER_PX2: f64 = 0.093;
+
+    /// Returns the strength for an edge at this angle. The fourth cumulant of the box, −(n_x⁴ + n_y⁴)/120 px⁴, gives 1/(2880 s⁴)
+    /// for rows and columns, and the factor 1 + 0.093/s² replaces all further terms. A corner with edges along rows and columns
+    /// is then wrong by at most 0.015 px under a box alone, and by 0.003 px under a box and a Gaussian of 0.15 px (tests).
+    /// Without the term, these are 0.15 and 0.06 px.
+    fn of(angle: f64, sharpness: f64) -> Self {
+        let square = sharpness.powi(2).min(MIN_BLUR_PX.powi(-2));
+        let (sin, cos) = (4.0 * angle).sin_cos();
+        let extra = Self::STRONGER_PX2 * square;
+        let by_direction = square.powi(2) / 2880.0 * (1.0 + extra);
+        let strength = by_direction * (3.0 + cos) / 4.0;
+        let by_sharpness = strength * (4.0 + 2.0 * extra / (1.0 + extra));
+        Self { strength, by_sharpness, by_turn: -by_direction * sin }
+    }
+}
+
 impl<const K: usize> Look<K> {
     pub(super) fn of(corner: &Corner<K>, optics: &Optics, piece: Piece, limits: [f32; 2]) -> Self {
         let spread = optics.spread(K);
@@ -73,7 +106,7 @@ impl<const K: usize> Look<K> {
                 by / (2.0 * squares[k])
             })
         });
-        // The series of an edge is that about a Gaussian, so motion has none.
+        // The series of an edge is that about a Gaussian, so motion has neither skewness nor pixel.
         let part = if spread.is_swept { 0.0 } else { 1.0 / 6.0 };
         let cubes: [[f64; K]; 2] = [0, 1]
             .map(|e| std::array::from_fn(|k| part * normals[k][e].powi(3) / squares[k].powf(1.5)));
@@ -126,6 +159,10 @@ impl<const K: usize> Look<K> {
             skewness,
             skewness_by_turn,
             by_skewness: cubes,
+            pixel: std::array::from_fn(|k| match spread.is_swept {
+                true => PixelBox::NONE,
+                false => PixelBox::of(corner.angles[k], sharpness[k]),
+            }),
             correlations,
             sharpness,
             way: spread.is_swept.then(|| way.map(|way| way as f32)),
@@ -151,6 +188,12 @@ impl<const K: usize> Look<K> {
         self.displaced.iter().any(|d| *d != 0.0)
     }
 
+    /// Returns these edges with the box of a pixel.
+    pub(super) fn with_pixel<P, const E: usize>(&self, edges: P) -> WithPixel<P, E> {
+        let strengths = std::array::from_fn(|k| self.pixel[k.min(K - 1)].strength as f32);
+        WithPixel { edges, strengths }
+    }
+
     /// Returns these three edges without motion, with the triangle between them if it is small. All lengths are multiplied
     /// by a factor.
     pub(super) fn with_spot<P>(&self, edges: P, factor: f32) -> Option<WithSpot<P>> {
@@ -174,10 +217,6 @@ impl<const K: usize> Look<K> {
     /// Returns these two edges with their halves displaced, and all lengths multiplied by a factor.
     pub(super) fn parted<P>(&self, edges: P, factor: f32) -> Parted<P> {
         Parted { edges, by: [0, 1].map(|k| self.displaced[k] as f32 * factor) }
-    }
-
-    pub(super) fn haloed<P: Copy>(&self, pattern: P) -> Haloed<P> {
-        self.haloed_of(|_| pattern)
     }
 
     /// Returns the haloed pattern. `pattern` creates the pattern with its own lengths multiplied by

@@ -22,12 +22,11 @@
 //!
 //! The curvatures κ of the edges by lens distortion are given, because a window is too small to distinguish them from
 //! the position. (u, v) are pixels from the window's centre. f is the blurred corner of
-//! [`crate::refine::blurred_corner`]. The blur s contains the pixel's own box as a variance of
-//! 1/12. Compared with exact integration, this causes no measurable error if the blur is at least
-//! 0.5 px (docs/benchmarks). A weak prior pulls the slopes g to 0; all other parameters are free.
+//! [`crate::refine::blurred_corner`]. The blur s contains the pixel's own box: as a variance of 1/12, and with its next
+//! cumulant (`look`). A weak prior pulls the slopes g to 0; all other parameters are free.
 //!
-//! The covariance is σ² (JᵀJ + prior)⁻¹ with the noise σ estimated from the residuals. It is accurate if the noise is
-//! white and the window shows only the corner; JPEG noise is not white.
+//! The covariance is σ² (JᵀJ + prior)⁻¹ with the noise σ estimated from the residuals, but at least that of rounding. It is
+//! accurate if the noise is white and the window shows only the corner; JPEG noise is not white.
 //!
 //! Input: the pixels around a corner, and its approximate position. Output: the corner with its covariance, or the
 //! equations of a corner and the parameters that it shares with others.
