@@ -45,6 +45,14 @@ class Detector:
     def version(cls):
         return importlib.metadata.version(cls.package)
 
+    @classmethod
+    def is_installed(cls):
+        try:
+            cls.version()
+        except importlib.metadata.PackageNotFoundError:
+            return False
+        return True
+
     def tags_to_corners(self, tags, order, shift):
         """Corners of an AprilGrid from tags: pairs of an id and four positions in `order`."""
         columns = self.spec["tags"][0]

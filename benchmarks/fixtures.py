@@ -6,7 +6,7 @@ The images are drawn from the description in the book of chess-corners, see prot
 so that an edge lies at a multiple of 1/8 px, not at the stated position: the mean distance between both is 0.0447 px, below which
 no method can fall. Therefore errors are given from the positions that are drawn, and from those that are stated, as the book does.
 The bound is the mean distance of an unbiased estimate with the least covariance (Cramér and Rao), without prior knowledge of
-anything but the pattern; rounding to grey levels counts as noise.
+anything but the pattern, in a circle up to the nearest corners; rounding to grey levels counts as noise.
 """
 
 import json
@@ -93,7 +93,7 @@ def mean_bound(square, blur, noise):
     fine = image(square, 0, 0, CENTRE + 0.5, CENTRE + 0.5, None).astype(float)
     clean = cv2.GaussianBlur(fine, (0, 0), blur) if blur else fine
     place = np.array([[CENTRE + 0.5, CENTRE + 0.5]])
-    [[xx, _, yy]] = photographs.bound(clean / 255, noise / 255, place, [square / 2])
+    [[xx, _, yy]] = photographs.bound(clean / 255, noise / 255, place, [square])
     return float(np.sqrt(np.pi / 2) * np.sqrt((xx + yy) / 2))
 
 

@@ -6,7 +6,6 @@ The files have the format that `score.py` reads, with CPU times and memory.
 """
 
 import argparse
-import importlib.metadata
 import json
 import os
 import pathlib
@@ -32,9 +31,7 @@ def run(folder):
     """Measures what is installed; prints what is not."""
     (folder / "found").mkdir(exist_ok=True)
     for detector in detectors.ALL:
-        try:
-            detector.version()
-        except importlib.metadata.PackageNotFoundError:
+        if not detector.is_installed():
             print(f"not compared, because it is not installed: {detector.name}")
             continue
         for board in (board for board in detector.boards if (folder / board / "truth.json").exists()):
@@ -46,6 +43,8 @@ def run(folder):
 
 def alone(script, detector, *arguments):
     """What `script --one … <detector>` prints as JSON, in a process and a thread of its own; None if it fails."""
+    if not detector.is_installed():
+        return None
     command = [str(of) for of in (sys.executable, script, "--one", *arguments, detector.name)]
     done = subprocess.run(command, env=os.environ | ONE_THREAD, capture_output=True, text=True)
     if done.returncode:

@@ -158,7 +158,7 @@ def fixtures_table(results):
         [condition, number(of["bound"], 4), *(cell(of[name]) for name in names)]
         for condition, of in results["fixtures"].items()
     ]
-    published = [[f"stated by {name}", "", *(number(of, 3) for of in figures)] for name, figures in protocol.PUBLISHED.items()]
+    published = [[f"stated by {name}", *(number(of, 3) for of in figures)] for name, figures in protocol.PUBLISHED.items()]
     columns = [list(column) for column in zip(["condition", "bound", *names], *rows)]
     return table(columns[0], columns[1:] + published)
 

@@ -332,10 +332,8 @@ fn fill<const K: usize, const C: usize, const JOINT: bool, P: Pattern<K>>(
             let bent = bends[k] * along[k];
             by_x += slopes[k] * (sines[k] + bent * cosines[k]);
             by_y -= slopes[k] * (cosines[k] - bent * sines[k]);
-            narrowed[k] = slopes[k] * h[k] + pixel_by_sharpness[k] * boxed[k];
-            if K == 2 {
-                narrowed[k] += shifts[k] * parted[k];
-            }
+            narrowed[k] =
+                slopes[k] * h[k] + shifts[k] * parted[k] + pixel_by_sharpness[k] * boxed[k];
             by_scale -= narrowed[k];
             let across = cosines[k] * dv - sines[k] * du;
             let mut by = -slopes[k] * (along[k] + bent * across) - narrowed[k] * by_turn[k];
