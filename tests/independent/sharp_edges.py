@@ -72,7 +72,8 @@ def main(deltille, folder):
             if rms > (most if turn == TURNS_DEG[-1] else most_aligned) or share > 3:
                 failed.append(f"blur {blur} px, {turn}°: {cells[-1]}")
         print(f"| {blur} | " + " | ".join(cells) + " |", flush=True)
-    sys.exit("\n".join(failed))
+    if failed:
+        sys.exit("\n".join(failed))
 
 
 if __name__ == "__main__":
