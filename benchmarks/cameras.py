@@ -8,7 +8,8 @@ point, k1, k2, p1 and p2. A fourth camera is a fisheye of 176°, equidistant wit
 `cv2.fisheye`), with the board in all parts of the image. lensboy and mrcal have no such model, only splines, and are not compared
 there. For each calibrator, over 20 seeds (5 of `calibrateCameraRO`, which takes seconds):
 
-    projection   RMS difference from the true camera over the whole image, after the best rotation, px
+    projection   RMS difference from the true camera over the whole image, after the best rotation, px, and e²/σ² over the stated
+                 variance of projections at infinity
     held out     RMS residual per axis of ten further views of a flat board, after the best pose of each, px; noise 0.05 px
     fx           RMS error of the focal length, px, and mean e²/σ² over the stated variance
     halves       mean squared difference of the focal lengths of the two halves of the views, over the sum of the stated variances
@@ -67,11 +68,13 @@ def equidistant(rays, k1, k2, k3, k4):
 
 @dataclass
 class Camera:
-    """A lens model with fx, fy, cx, cy and four coefficients, and the stated standard deviation of fx or None."""
+    """A lens model with fx, fy, cx, cy and four coefficients; the stated standard deviation of fx or None; and a function of
+    pixels for the stated variance of projections at infinity, px² per axis, or None."""
 
     lens: Callable
     values: np.ndarray
     fx_sd: float | None = None
+    variance: Callable | None = None
 
     @property
     def fx(self):
@@ -216,7 +219,24 @@ def by_mrcal(data):
         subprocess.run(command, cwd=folder, check=True, capture_output=True)
         text = pathlib.Path(folder, "camera-0.cameramodel").read_text()
     found = re.search(r"'intrinsics':\s*\[([^\]]*)\]", text)[1]
-    return Camera(brown, np.array([float(value) for value in found.split(",") if value.strip()]))
+    values = np.array([float(value) for value in found.split(",") if value.strip()])
+    return Camera(brown, values, variance=lambda pixels: variance_of_mrcal(text, pixels))
+
+
+def variance_of_mrcal(model, pixels):
+    """By the Python for which Debian has mrcal, that of its programs."""
+    code = """
+import mrcal, numpy, sys
+model, pixels = mrcal.cameramodel("a.cameramodel"), numpy.load("pixels.npy")
+rays = mrcal.unproject(pixels, *model.intrinsics(), normalize=True)
+numpy.save("variance.npy", mrcal.projection_uncertainty(rays, model, atinfinity=True, what="rms-stdev") ** 2)
+"""
+    first = pathlib.Path(shutil.which("mrcal-calibrate-cameras")).read_text().splitlines()[0]
+    with tempfile.TemporaryDirectory() as folder:
+        pathlib.Path(folder, "a.cameramodel").write_text(model)
+        np.save(f"{folder}/pixels.npy", pixels)
+        subprocess.run([*first[2:].split(), "-c", code], cwd=folder, check=True, capture_output=True)
+        return np.load(f"{folder}/variance.npy")
 
 
 def by_pycolmap(data):
@@ -270,17 +290,20 @@ def by_deltille(target, **more):
             text = {"schema": "deltille/detection/1", "image": f"{index:02}", "width": SIZE[0], "height": SIZE[1]}
             found.append(deltille.Detection.from_json(json.dumps(text | {"grids": [grid]})))
         found = deltille.calibrate(found, target, model, assume_target=True, board_accuracy_mm=0, **more)
-        return Camera(data.start.lens, found.camera.parameters[:8], float(found.observed_sd[0]))
+        variance = lambda pixels: np.trace(found.projection_covariance(pixels, source="observed"), axis1=1, axis2=2) / 2
+        return Camera(data.start.lens, found.camera.parameters[:8], float(found.observed_sd[0]), variance)
 
     return calibrate
 
 
+# Positions all over the image.
+PIXELS = np.stack(np.meshgrid(np.linspace(0, SIZE[0] - 1, 21), np.linspace(0, SIZE[1] - 1, 16)), axis=-1).reshape(-1, 2)
+
+
 def projection_error(camera, truth):
-    """RMS difference from the true camera over the image, after the rotation that fits best, px."""
-    x, y = np.meshgrid(np.linspace(0, SIZE[0] - 1, 21), np.linspace(0, SIZE[1] - 1, 16))
-    pixels = np.c_[x.ravel(), y.ravel()]
-    rays = truth.rays(pixels)
-    off = lambda turn: (camera.project(rays @ rotation(turn).T) - pixels).ravel()
+    """RMS difference from the true camera over the image, after the rotation that fits best, px per axis."""
+    rays = truth.rays(PIXELS)
+    off = lambda turn: (camera.project(rays @ rotation(turn).T) - PIXELS).ravel()
     return float(np.sqrt(np.mean(scipy.optimize.least_squares(off, np.zeros(3)).fun ** 2)))
 
 
@@ -342,6 +365,8 @@ def main(folder):
                     "projection": projection_error(camera, truth), "held_out": held_out(camera, others),
                     "fx": off, "cpu_s": seconds,
                 }
+                if camera.variance is not None:
+                    row["projection_share"] = row["projection"] ** 2 / float(np.mean(camera.variance(PIXELS)))
                 if halves:
                     row["share"] = (off / camera.fx_sd) ** 2
                     row["halves"] = (halves[0].fx - halves[1].fx) ** 2 / (halves[0].fx_sd ** 2 + halves[1].fx_sd ** 2)
@@ -352,7 +377,8 @@ def main(folder):
             of = lambda average, key: float(average(column(key))) if len(column(key)) else None
             rms = lambda of: np.sqrt(np.mean(of**2))
             table[case][name] = {
-                "projection_px": of(rms, "projection"), "held_out_px": of(rms, "held_out"), "fx_px": of(rms, "fx"),
+                "projection_px": of(rms, "projection"), "projection_share": of(np.mean, "projection_share"),
+                "held_out_px": of(rms, "held_out"), "fx_px": of(rms, "fx"),
                 "over_stated": of(np.mean, "share"), "halves": of(np.mean, "halves"), "cpu_s": of(np.median, "cpu_s"),
             } | ({"failed": failed[name]} if failed[name] else {})
             print(case, name, table[case][name], flush=True)

@@ -43,7 +43,8 @@ class Detector:
 
     @classmethod
     def version(cls):
-        return importlib.metadata.version(cls.package)
+        """The version of the package; raises PackageNotFoundError if it is not installed."""
+        return importlib.metadata.version(cls.package) if cls.package else ""
 
     @classmethod
     def is_installed(cls):
@@ -80,17 +81,18 @@ class Deltille(Detector):
 
     def __call__(self, image):
         found = self.detect(np.ascontiguousarray(image[..., ::-1]) if image.ndim == 3 else image)
+        covariance = lambda of: [of[0, 0], of[0, 1], of[1, 1]]
         if self.board == "checkerboard":
-            # Where a part of the board fits in several places, its corners have no ids.
-            grid = max(found.grids, key=len, default=None)
-            return [] if grid is None else [
-                ({"row": int(row), "col": int(col)}, x, y, [cov[0, 0], cov[0, 1], cov[1, 1]])
+            # Where a part of the board fits in several places, its corners have no ids. Corners of other grids are far away.
+            grids = sorted(found.grids, key=len, reverse=True)
+            return [
+                ({"row": int(row) + 1000 * index, "col": int(col)}, x, y, covariance(cov))
+                for index, grid in enumerate(grids)
                 for row, col, (x, y), cov in zip(grid.rows, grid.cols, grid.pixels, grid.covariances)
             ]
         return [
-            ({"id": int(number)}, x, y, [cov[0, 0], cov[0, 1], cov[1, 1]])
+            ({"id": -1 if grid.panel is None else int(number)}, x, y, covariance(cov))
             for grid in found.grids
-            if grid.panel is not None
             for number, (x, y), cov in zip(grid.ids, grid.pixels, grid.covariances)
         ]
 
@@ -145,7 +147,7 @@ def numbered(corners, size):
 
 class OpenCvCharuco(OpenCv):
     name, boards = "OpenCV CharucoDetector", ("charuco",)
-    settings = "CORNER_REFINE_SUBPIX for markers, otherwise defaults"
+    settings = "defaults"
 
     def prepare(self):
         import cv2
@@ -153,9 +155,7 @@ class OpenCvCharuco(OpenCv):
         dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, self.spec["dictionary"]))
         board = cv2.aruco.CharucoBoard(self.spec["squares"], self.spec["square_mm"], self.spec["marker_mm"], dictionary)
         board.setLegacyPattern(self.spec.get("legacy", False))
-        parameters = cv2.aruco.DetectorParameters()
-        parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-        self.detect = cv2.aruco.CharucoDetector(board, cv2.aruco.CharucoParameters(), parameters)
+        self.detect = cv2.aruco.CharucoDetector(board)
 
     def __call__(self, image):
         corners, ids, _, _ = self.detect.detectBoard(grey(image))
@@ -166,7 +166,9 @@ class OpenCvCharuco(OpenCv):
 
 class OpenCvAprilTag(OpenCv):
     name, boards = "OpenCV ArucoDetector", ("aprilgrid", "tags")
-    settings = "DICT_APRILTAG_36h11, CORNER_REFINE_SUBPIX, for borders of two bits in windows of two bits, otherwise defaults"
+    settings = "DICT_APRILTAG_36h11, CORNER_REFINE_SUBPIX, otherwise defaults"
+    # Of the refinement, in bits: the default is 0.3.
+    window = None
 
     def prepare(self):
         import cv2
@@ -174,9 +176,8 @@ class OpenCvAprilTag(OpenCv):
         parameters = cv2.aruco.DetectorParameters()
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
         parameters.markerBorderBits = round(self.spec["border_bits"])
-        if parameters.markerBorderBits > 1:
-            # The default, 0.3 bits, is too small to reach the corner.
-            parameters.relativeCornerRefinmentWinSize = self.spec["border_bits"]
+        if self.window is not None:
+            parameters.relativeCornerRefinmentWinSize = self.window(self.spec)
         dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
         self.detect = cv2.aruco.ArucoDetector(dictionary, parameters)
 
@@ -184,6 +185,14 @@ class OpenCvAprilTag(OpenCv):
         places, ids, _ = self.detect.detectMarkers(grey(image))
         tags = [] if ids is None else zip(np.ravel(ids), (np.reshape(of, (4, 2)) for of in places))
         return self.tags_to_corners(tags, CW_FROM_LOWER_RIGHT, 0.0)
+
+
+class OpenCvAprilTagWide(OpenCvAprilTag):
+    """With the default window, many corners are not reached."""
+
+    name = "OpenCV ArucoDetector, wide"
+    settings = "the same, with windows as wide as the border of the tag"
+    window = staticmethod(lambda spec: spec["border_bits"])
 
 
 class CalibTargets(Detector):
@@ -296,11 +305,12 @@ class Reference(Detector):
         corners = []
         for _, point, ordered, x, y in (line.split(",") for line in lines if line.count(",") == 4):
             row, col = divmod(int(point), self.columns)
-            label = {"id": self.ids.get((row, col), -1)} if ordered == "1" else {"row": row, "col": col}
+            known = self.ids.get((row, col), -1) if ordered == "1" else -1
+            label = {"row": row, "col": col} if self.board == "checkerboard" else {"id": known}
             corners.append((label, float(x), float(y), None))
         return corners
 
 
 ALL = [
-    Deltille, Reference, OpenCvClassic, OpenCvSb, OpenCvCharuco, OpenCvAprilTag, CalibTargets, PupilAprilTags, PyAprilTags, Locus,
+    Deltille, Reference, OpenCvClassic, OpenCvSb, OpenCvCharuco, OpenCvAprilTag, OpenCvAprilTagWide, CalibTargets, PupilAprilTags, PyAprilTags, Locus,
 ]

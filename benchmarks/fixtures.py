@@ -5,6 +5,7 @@
 The images are drawn from the description in the book of chess-corners, see protocol.py. They average points on a grid of 1/8 px,
 so that an edge lies at a multiple of 1/8 px, not at the stated position: the mean distance between both is 0.0447 px, below which
 no method can fall. Therefore errors are given from the positions that are drawn, and from those that are stated, as the book does.
+chess-corners detects the corner before it refines it, which fails with squares of 5 px: its refinement alone is not available.
 The bound is the mean distance of an unbiased estimate with the least covariance (Cramér and Rao), without prior knowledge of
 anything but the pattern, in a circle up to the nearest corners; rounding to grey levels counts as noise.
 """
@@ -22,6 +23,8 @@ import photographs
 import protocol
 
 SIDE, CENTRE, POINTS = 45, 22, 8
+# The best of all windows that no other corner touches.
+BEST = "OpenCV cornerSubPix, best window"
 # Positions of the points, px.
 FINE = (np.arange(SIDE * POINTS) + 0.5) / POINTS - 0.5
 
@@ -43,9 +46,10 @@ def drawn_at(position):
     return FINE[np.searchsorted(FINE, np.subtract(position, 1e-9))] - 0.5 / POINTS
 
 
-def by_opencv(picture, seed):
+def by_opencv(half):
+    """In a window of 2·half + 1 px."""
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-3)
-    return cv2.cornerSubPix(picture, np.float32([[seed]]), (5, 5), (-1, -1), criteria).ravel()
+    return lambda picture, seed: cv2.cornerSubPix(picture, np.float32([[seed]]), (half, half), (-1, -1), criteria).ravel()
 
 
 def by_chess_corners(refiner):
@@ -79,7 +83,9 @@ def by_deltille(program, square):
 
 def refiners(program, square):
     yield "deltille refine", by_deltille(program, square)
-    yield "OpenCV cornerSubPix", by_opencv
+    yield "OpenCV cornerSubPix", by_opencv(5)
+    for half in range(2, square):
+        yield BEST, by_opencv(half)
     try:
         yield "chess-corners Förstner", by_chess_corners("forstner")
         yield "chess-corners saddle point", by_chess_corners("saddle_point")
@@ -107,10 +113,15 @@ def main(program, folder):
         for name, refine in refiners(program, square):
             found = [refine(picture, np.round(at)) for at, picture in zip(places, pictures)]
             # A corner farther than half a square is another one.
-            pairs = [(at, of) for at, of in zip(found, places) if at is not None and np.hypot(*np.subtract(at, of)) < square / 2]
+            is_near = lambda at, of: at is not None and np.hypot(*np.subtract(at, of)) < square / 2
+            pairs = [pair for pair in zip(found, places) if is_near(*pair)]
             mean = lambda true: float(np.mean([np.hypot(*np.subtract(at, true(of))) for at, of in pairs])) if pairs else None
-            table[condition][name] = {"found": len(pairs), "drawn": mean(drawn_at), "stated": mean(lambda at: at)}
-            print(condition, name, table[condition][name], flush=True)
+            row = {"found": len(pairs), "drawn": mean(drawn_at), "stated": mean(lambda at: at)}
+            rank = lambda of: (of["found"], -(of["drawn"] or 0))
+            if name not in table[condition] or rank(row) > rank(table[condition][name]):
+                table[condition][name] = row
+        for name, row in table[condition].items():
+            print(condition, name, row, flush=True)
     (folder / "fixtures.json").write_text(json.dumps(table))
 
 

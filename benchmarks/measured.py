@@ -10,6 +10,7 @@ import json
 import os
 import pathlib
 import resource
+import shutil
 import subprocess
 import sys
 import time
@@ -29,7 +30,8 @@ def cpu_s():
 
 def run(folder):
     """Measures what is installed; prints what is not."""
-    (folder / "found").mkdir(exist_ok=True)
+    shutil.rmtree(folder / "found", ignore_errors=True)
+    (folder / "found").mkdir()
     for detector in detectors.ALL:
         if not detector.is_installed():
             print(f"not compared, because it is not installed: {detector.name}")

@@ -52,8 +52,8 @@ def photographs(data):
 def main(deltille, folder, data):
     made, table = folder / "paper-boards", []
     for name, board, command in SETS:
-        if not (data / name).is_dir():
-            print(f"skipped: {data / name} does not exist")
+        if not (data / name).is_dir() or not photographs(data / name):
+            print(f"skipped: no photographs in {data / name}")
             continue
         command = [deltille, *command.split(), "--name", board, "-o", made, "--force", "--no-verify"]
         subprocess.run([str(part) for part in command], check=True, capture_output=True)

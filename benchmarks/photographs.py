@@ -11,6 +11,7 @@ import concurrent.futures
 import json
 import math
 import pathlib
+import shutil
 import subprocess
 import sys
 
@@ -98,13 +99,12 @@ def shoot(page, scene, seed):
 
 
 def make(folder, deltille, seed, scenes, boards):
-    """Writes what is missing."""
+    """Writes the boards and their photographs, instead of earlier ones."""
     made = folder / "boards"
-    made.mkdir(parents=True, exist_ok=True)
     for board in boards:
-        if not (made / f"{board}.pdf").exists():
-            command = [deltille, *protocol.BOARDS[board].split(), "--pdf", "--name", board, "-o", made]
-            subprocess.run([str(part) for part in command], check=True, capture_output=True)
+        shutil.rmtree(folder / board, ignore_errors=True)
+        command = [deltille, *protocol.BOARDS[board].split(), "--pdf", "--name", board, "-o", made, "--force"]
+        subprocess.run([str(part) for part in command], check=True, capture_output=True)
     work = [(folder, board, scene, seed) for board in boards for scene in scenes]
     with concurrent.futures.ProcessPoolExecutor() as pool:
         parts = list(pool.map(one, *zip(*work)))
@@ -151,8 +151,8 @@ def one(folder, board, scene, seed):
 
 def arguments(parser):
     parser.add_argument("--seed", type=int, default=protocol.SEED)
-    parser.add_argument("--scene", nargs="*", default=list(protocol.SCENES), choices=protocol.SCENES, metavar="NAME")
-    parser.add_argument("--board", nargs="*", default=list(protocol.BOARDS), choices=protocol.BOARDS)
+    parser.add_argument("--scene", nargs="+", default=list(protocol.SCENES), choices=protocol.SCENES, metavar="NAME")
+    parser.add_argument("--board", nargs="+", default=list(protocol.BOARDS), choices=protocol.BOARDS)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ its AprilTags are where lines fitted to their edges meet.
 
 import json
 import pathlib
+import shutil
 import subprocess
 import sys
 
@@ -32,8 +33,7 @@ def pages_of_deltille(deltille, folder):
     subprocess.run([str(part) for part in command], check=True, capture_output=True)
     yield "PDF, poppler", *by_poppler(folder / "ours.pdf")
     yield "PDF, pdfium", *by_pdfium(folder / "ours.pdf")
-    yield "SVG, cairo", *by_cairo(folder / "ours.svg")
-    yield "SVG, Chromium", *by_chromium(folder / "ours.svg")
+    yield from drawn(folder / "ours.svg")
 
 
 def pages_of_opencv(_, folder):
@@ -51,8 +51,7 @@ def pages_of_calib_targets(_, folder):
         page=page, render=ct.RenderOptions(png_dpi=IMAGE_DPI),
     )
     written = ct.write_target_bundle(document, str(folder / "calib-targets"))
-    yield "SVG, cairo", *by_cairo(pathlib.Path(written.svg_path))
-    yield "SVG, Chromium", *by_chromium(pathlib.Path(written.svg_path))
+    yield from drawn(pathlib.Path(written.svg_path))
     yield f"image, {IMAGE_DPI} dpi", cv2.imread(str(written.png_path), cv2.IMREAD_GRAYSCALE), IMAGE_DPI
 
 
@@ -68,8 +67,7 @@ def pages_of_pattern_tools(_, folder):
     board += ["-T", "charuco_board", "-f", tools / "DICT_4X4_100.json.gz", "-o", path]
     command = [sys.executable, tools / "generate_pattern.py", *board]
     subprocess.run([str(part) for part in command], check=True)
-    yield "SVG, cairo", *by_cairo(path)
-    yield "SVG, Chromium", *by_chromium(path)
+    yield from drawn(path)
 
 
 # The pages, and the detector of the same project.
@@ -144,6 +142,15 @@ def by_chromium(path):
     return by_poppler(pdf)
 
 
+RENDERERS = {"cairo": by_cairo} | ({"Chromium": by_chromium} if shutil.which("chromium") else {})
+
+
+def drawn(path):
+    """An SVG as drawn by each program that is installed."""
+    for way, draw in RENDERERS.items():
+        yield f"SVG, {way}", *draw(path)
+
+
 def board_of_opencv():
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_100)
     return cv2.aruco.CharucoBoard((COLUMNS, ROWS), SQUARE_MM, MARKER_MM, dictionary)
@@ -177,12 +184,12 @@ def errors(page_mm, nominal):
     }
 
 
-def measured_mesh(path, stated, count):
+def measured_mesh(path, stated, count, draw):
     """The same for the tags of a 3MF file, whether their cells are exact, and whether its bodies are closed."""
     bodies = meshes.bodies(path)
     face = path.with_suffix(".face.svg")
     meshes.write_face(bodies, face)
-    image, dpi = by_cairo(face)
+    image, dpi = draw(face)
     found = meshes.tags(image, dpi)
     read = [tag for tag in stated if tag in found]
     row = {"corners": 4 * len(read), "markers": len(read)}
@@ -218,8 +225,9 @@ def main(deltille, folder):
         except ImportError as error:
             print(f"{name}: 3MF skipped, {error}")
             continue
-        table[f"{name}: 3MF"] = measured_mesh(path, stated, count)
-        print(name, "3MF", table[f"{name}: 3MF"], flush=True)
+        for way, draw in RENDERERS.items():
+            table[f"{name}: 3MF, {way}"] = measured_mesh(path, stated, count, draw)
+            print(name, "3MF", way, table[f"{name}: 3MF, {way}"], flush=True)
     (folder / "prints.json").write_text(json.dumps(table))
 
 

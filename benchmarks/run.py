@@ -1,6 +1,6 @@
 """deltille beside other detectors, calibrators and generators: installs them, makes the data, measures, and prints tables.
 
-    python benchmarks/run.py FOLDER                # everything: about half an hour on two cores
+    python benchmarks/run.py FOLDER                # everything: about three quarters of an hour on two cores
     python benchmarks/run.py FOLDER --scene usual "tilt 60°" --board charuco
     python benchmarks/run.py FOLDER --write        # also into docs/benchmarks.md, its plot and results.json
 
@@ -11,6 +11,7 @@ What cannot be installed is not compared, and named. poppler (pdftocairo) draws 
 import argparse
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 
@@ -44,16 +45,30 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--seed", type=int, default=protocol.SEED)
-    parser.add_argument("--scene", nargs="*", choices=protocol.SCENES, metavar="NAME", help=", ".join(protocol.SCENES))
-    parser.add_argument("--board", nargs="*", choices=protocol.BOARDS)
+    parser.add_argument("--scene", nargs="+", choices=protocol.SCENES, metavar="NAME", help=", ".join(protocol.SCENES))
+    parser.add_argument("--board", nargs="+", choices=protocol.BOARDS)
     parser.add_argument("--paper", type=pathlib.Path, help="the paper's data set: a folder with `fisheye` and `robot-hand`")
     parser.add_argument("--reference", type=pathlib.Path, help="the paper's detector, see detectors.py, class Reference")
     parser.add_argument("--write", action="store_true", help="replace the tables of docs/benchmarks.md, the plot and results.json")
     parser.add_argument("--python", type=pathlib.Path, help="an interpreter that has the packages; nothing is installed")
     parser.add_argument("--program", type=pathlib.Path, help="the program deltille [default: it is built]")
     given = parser.parse_args()
+    if given.seed < 0:
+        parser.error("--seed: must not be negative")
+    if not shutil.which("pdftocairo"):
+        parser.error("pdftocairo was not found: install poppler (Debian: poppler-utils)")
+    for option in ("python", "program", "reference"):
+        if (path := getattr(given, option)) and not os.access(path, os.X_OK):
+            parser.error(f"--{option}: {path} is not a program")
+    if given.paper and not any((given.paper / name).is_dir() for name in ("fisheye", "robot-hand")):
+        parser.error(f"--paper: {given.paper} has neither the folder fisheye nor robot-hand")
+    if given.write and (given.scene or given.board):
+        parser.error("--write: needs all scenes and boards")
     folder = given.folder.resolve()
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        parser.error(f"{folder}: {error.strerror}")
     # `resolve` would leave a virtual environment.
     python = given.python.absolute() if given.python else installed(folder)
     program = given.program and given.program.resolve()
@@ -61,7 +76,12 @@ def main():
         subprocess.run(["cargo", "build", "--release", "--bin", "deltille"], cwd=PROJECT, check=True)
         program = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", PROJECT / "target")) / "release/deltille"
     chosen = [part for name in ("scene", "board") if (of := getattr(given, name)) for part in (f"--{name}", *of)]
-    script = lambda name, *arguments: subprocess.run([python, HERE / f"{name}.py", *map(str, arguments)], check=True)
+
+    def script(name, *arguments):
+        code = subprocess.run([python, HERE / f"{name}.py", *map(str, arguments)]).returncode
+        if code != 0:
+            sys.exit(f"{name}.py ended with exit code {code}")
+
     if given.reference:
         os.environ["REFERENCE_DETECTOR"] = str(given.reference.resolve())
     script("photographs", program, folder, "--seed", given.seed, *chosen)

@@ -15,7 +15,7 @@ codes, `{"row": …, "col": …}` in any frame of the lattice. `covariance` is `
 For each scene and for all together:
 
     found     corners within 0.3 of the distance to their nearest neighbour, over those that are visible
-    wrong     corners elsewhere, or that do not exist
+    wrong     corners elsewhere, that do not exist, or whose label was reported before; also those that are not numbers
     rms       RMS error per axis of the found corners, px; median: of their distance from the truth
     bound     RMS of errors over the Cramér–Rao bound of each corner; scenes without a bound (colour, JPEG) do not count
     e²/σ²     mean squared error over the stated variance, per axis; 1 if it is right
@@ -66,7 +66,11 @@ def aligned(truth, corners):
 def judged(truth, corners):
     """What one photograph contributes: corners due, found and wrong; errors, shares of bounds and of stated variances."""
     of = {"due": sum(corner["visible"] for corner in truth), "wrong": 0, "errors": [], "over_bound": [], "over_stated": []}
+    labels = set()
     for corner, at in labelled(truth, corners) if corners else []:
+        if id(at) in labels:
+            at = None
+        labels.add(id(at))
         error = np.array([corner["x"] - at["x"], corner["y"] - at["y"]]) if at else np.array([np.inf, np.inf])
         if not math.hypot(*error) < WRONG * (at["nearest_px"] if at else 1):
             of["wrong"] += 1
@@ -112,6 +116,37 @@ def score(truth, result):
     return {"all": summed(every), "scenes": {scene: summed(of) for scene, of in parts.items()}}
 
 
+class Invalid(Exception):
+    """The file of a detector is not as described above."""
+
+
+def checked(truth, result):
+    """Raises Invalid with the photograph and what is wrong with it."""
+    if result.get("board", truth["board"]) != truth["board"]:
+        raise Invalid(f"its board is {result['board']!r}, that of the photographs {truth['board']!r}")
+    if not isinstance(result.get("photographs"), dict):
+        raise Invalid("it has no `photographs`, by name")
+    is_number = lambda of: isinstance(of, (int, float)) and not isinstance(of, bool)
+    is_whole = lambda of: isinstance(of, int) and not isinstance(of, bool)
+    for name, photograph in result["photographs"].items():
+        if name not in truth["photographs"]:
+            raise Invalid(f"there is no photograph {name!r}: names have no ending, as in {next(iter(truth['photographs']))!r}")
+        if "cpu_s" in photograph and not (is_number(photograph["cpu_s"]) and photograph.get("px", 0) > 0):
+            raise Invalid(f"{name}: `cpu_s` needs a number, and the number of pixels as `px`")
+        for index, corner in enumerate(photograph.get("corners", [])):
+            label, covariance = corner.get("label"), corner.get("covariance")
+            kinds = [{"id"}, {"row", "col"}] if truth["board"] == "checkerboard" else [{"id"}]
+            if not isinstance(label, dict) or set(label) not in kinds or not all(map(is_whole, label.values())):
+                keys = " or ".join(str(sorted(of)) for of in kinds)
+                raise Invalid(f"{name}, corner {index}: the label {label!r} is not {keys} with whole numbers")
+            if not (is_number(corner.get("x")) and is_number(corner.get("y"))):
+                raise Invalid(f"{name}, corner {index}: `x` and `y` must be numbers")
+            if covariance is not None:
+                xx, xy, yy = covariance
+                if not (xx > 0 and xx * yy > xy * xy):
+                    raise Invalid(f"{name}, corner {index}: the covariance {covariance} is not positive definite")
+
+
 def shown(figures):
     number = lambda value, places: "–" if value is None else f"{value:.{places}f}"
     return (
@@ -121,9 +156,29 @@ def shown(figures):
     )
 
 
-if __name__ == "__main__":
-    truth, result = (json.loads(pathlib.Path(path).read_text()) for path in sys.argv[1:3])
+def main():
+    if len(sys.argv) != 3:
+        sys.exit("usage: score.py BOARD/truth.json mine.json; see the first lines of score.py")
+    read = []
+    for path in sys.argv[1:]:
+        try:
+            read.append(json.loads(pathlib.Path(path).read_text()))
+        except OSError as error:
+            sys.exit(f"{path}: {error.strerror}")
+        except ValueError as error:
+            sys.exit(f"{path}: not JSON: {error}")
+    truth, result = read
+    if "photographs" not in truth or "size_px" not in truth:
+        sys.exit(f"{sys.argv[1]}: not the truth.json of a board")
+    try:
+        checked(truth, result)
+    except Invalid as error:
+        sys.exit(f"{sys.argv[2]}: {error}")
     figures = score(truth, result)
     print(f"{'scene':14}  {'found':>16}  wrong  {'rms px':>8}  {'median':>8}  bound  {'e²/σ²':>7}  {'ms/Mpx':>7}  {'worst':>7}")
     for scene, of in (*figures["scenes"].items(), ("all", figures["all"])):
         print(f"{scene:14}  {shown(of)}")
+
+
+if __name__ == "__main__":
+    main()

@@ -25,18 +25,27 @@ OURS = "deltille"
 
 def collected(folder):
     """The figures of all detectors, calibrators and generators."""
-    rows = []
+    rows, truths = [], {}
     for path in sorted((folder / "found").glob("*.json")):
         result = json.loads(path.read_text())
         of_board = folder / result["board"] / "truth.json"
         if not of_board.exists():
             continue
-        truth = json.loads(of_board.read_text())
-        about = {key: result[key] for key in ("detector", "version", "settings", "board", "memory_mb")}
+        truth = truths[result["board"]] = json.loads(of_board.read_text())
+        try:
+            score.checked(truth, result)
+        except score.Invalid as error:
+            sys.exit(f"{path}: {error}")
+        about = {"detector": path.stem, "version": "", "settings": "", "memory_mb": None}
+        about |= {key: value for key, value in result.items() if key != "photographs"}
         rows.append(about | score.score(truth, result))
+    if not rows:
+        sys.exit(f"{folder}: no results; run.py writes them")
+    if len(seeds := {truth["seed"] for truth in truths.values()}) > 1:
+        sys.exit(f"{folder}: photographs of the seeds {sorted(seeds)}; use a folder for each")
     order = list(protocol.BOARDS)
     rows.sort(key=lambda row: (order.index(row["board"]), row["detector"] != OURS, row["detector"].lower()))
-    about = {"date": time.strftime("%Y-%m-%d"), "machine": processor(), "seed": truth["seed"]}
+    about = {"date": time.strftime("%Y-%m-%d"), "machine": processor(), "seed": seeds.pop()}
     more = {
         name: json.loads(path.read_text()) if (path := folder / f"{name}.json").exists() else {}
         for name in ("cameras", "prints", "paper", "public", "fixtures")
@@ -73,12 +82,17 @@ def share(row):
     return 100 * row["found"] / row["due"] if row["due"] else 0.0
 
 
+def least(value):
+    """A figure for comparison; that of no corners is larger than any."""
+    return float("inf") if value is None else value
+
+
 def behind(ours, peers):
     """In what a peer is ahead: in corners, or in the error of at least nine tenths as many."""
     if any(of["found"] > ours["found"] or of["wrong"] < ours["wrong"] for of in peers):
         yield "corners"
     as_many = (of for of in peers if of["found"] >= 0.9 * ours["found"] and of["rms_px"] is not None)
-    if any(of["rms_px"] < (ours["rms_px"] or float("inf")) for of in as_many):
+    if any(of["rms_px"] < least(ours["rms_px"]) for of in as_many):
         yield "error"
 
 
@@ -110,11 +124,14 @@ def scenes_table(results, board):
 
 
 def cameras_table(results):
-    head = ["corners", "calibration", "projection, px", "held out, px", "fx, px", "fx: e²/σ²", "halves: e²/σ²", "CPU s", "failed"]
+    head = [
+        "corners", "calibration", "projection, px", "e²/σ²", "held out, px", "fx, px", "fx: e²/σ²", "halves: e²/σ²", "CPU s", "failed",
+    ]
     rows = [
         [
-            case, name, number(of["projection_px"], 3), number(of.get("held_out_px"), 4), number(of["fx_px"], 3), number(of["over_stated"], 2),
-            number(of["halves"], 2), number(of["cpu_s"], 2), str(of.get("failed", 0)),
+            case, name, number(of["projection_px"], 3), number(of["projection_share"], 2), number(of["held_out_px"], 4),
+            number(of["fx_px"], 3), number(of["over_stated"], 2), number(of["halves"], 2), number(of["cpu_s"], 2),
+            str(of.get("failed", 0)),
         ]
         for case, by_name in results["cameras"].items()
         for name, of in by_name.items()
@@ -138,7 +155,7 @@ def public_table(results):
     rows = [
         [
             of["set"], f"{of['detector']} {of['version']}".strip(), f"{of['images']} of {of['photographs']}",
-            f"{of['corners']} of {of['due']}", str(of["elsewhere"]), number(of["rms_px"], 3), number(of["deltille_rms_px"], 3),
+            f"{of['corners']} of {of['due']}", "–" if of["detector"] == OURS else str(of["elsewhere"]), number(of["rms_px"], 3), number(of["deltille_rms_px"], 3),
             number(of["ms_per_mpx"], 0),
         ]
         for of in results["public"]
@@ -192,10 +209,10 @@ def written(results):
         text += f"\nCorners found and RMS error in px by scene, `{board}`:\n\n" + scenes_table(results, board)
     parts = [
         ("paper", paper_table, "Photographs of untagged boards by Ha et al.: a checkerboard of 8 × 11 corners through a fisheye of 220° (`fisheye`), and a deltille grid of 10 × 11 corners (`robot-hand`):"),
-        ("public", public_table, "Photographs by other people. *Elsewhere* are corners more than 3 px from those of deltille with the same label. Residuals are those of `calibrateCamera` (four distortion parameters), for EuRoC and TUM VI of a pose with the published camera, over the corners that the detector and deltille have in common; they contain the errors of the board and of the lens model:"),
+        ("public", public_table, "Photographs by other people. Nobody knows the true corners: those of deltille are the reference, and *elsewhere* are corners more than 3 px from those with the same label. Residuals are those of `calibrateCamera` (four distortion parameters), for EuRoC and TUM VI of a pose with the published camera, over the corners that the detector and deltille have in common; they contain the errors of the board and of the lens model:"),
         ("fixtures", fixtures_table, "The fixture of chess-corners: mean distance of a refined corner from the position that is drawn, and from the one that is stated, px (see `benchmarks/fixtures.py`; in brackets the number of corners found, if not all 36):"),
-        ("cameras", cameras_table, "Calibrations from the same simulated corners (RMS or mean over 20 seeds; `calibrateCameraRO`: 5):"),
-        ("prints", prints_table, "One ChArUco board from several generators, and AprilTags in 3MF files for printers with two colours:"),
+        ("cameras", cameras_table, "Calibrations from the same simulated corners (RMS or mean over 20 seeds; `calibrateCameraRO`: 5). *Projection* is the difference from the true camera over the image, after the best rotation, with its square over the stated variance of projections at infinity; *held out* the residual of other views of a flat board, with noise of 0.05 px; *halves* the squared difference of the focal lengths from two halves of the views, over the stated variances:"),
+        ("prints", prints_table, "One ChArUco board from several generators, and AprilTags in 3MF files for printers with two colours. RMS and largest are errors of single corners, without the scales; 3MF files have all cells of the tags as in the dictionary, and closed bodies:"),
     ]
     for name, of, heading in parts:
         if results.get(name):
@@ -204,17 +221,30 @@ def written(results):
 
 
 def for_readme(results):
-    """Boards that others read too: deltille beside the detector that finds most corners."""
+    """Boards that others read too: deltille beside the best of all other detectors in each figure."""
     lines = []
-    cell = lambda of: f"{share(of):.1f} %, {number(of['rms_px'], 4)} px, {number(of['ms_per_mpx'], 0)} ms/Mpx"
     for board in protocol.BOARDS:
-        of_board = {row["detector"]: row["all"] for row in results["detectors"] if row["board"] == board}
+        of_board = {row["detector"]: row["all"] | {"share": share(row["all"])} for row in results["detectors"] if row["board"] == board}
         ours = of_board.pop(OURS, None)
         if ours is None or not of_board:
             continue
-        name, best = max(of_board.items(), key=lambda of: (of[1]["found"], -of[1]["rms_px"]))
-        lines.append([f"`{board}`", cell(ours), f"{cell(best)} ({name})"])
-    return table(["18 scenes: corners found, RMS error, CPU time", OURS, "the peer that finds most"], lines)
+        # Few corners are easy ones.
+        many = {name: of for name, of in of_board.items() if is_comparable(of, ours)} or of_board
+        cells = []
+        for key, best, text in (
+            ("share", max, lambda value: f"{value:.1f} %"), ("rms_px", min, lambda value: f"{number(value, 4)} px"),
+            ("ms_per_mpx", min, lambda value: f"{number(value, 0)} ms/Mpx"),
+        ):
+            name = best(many, key=lambda name: least(many[name][key]))
+            cells += [text(ours[key]), f"{text(many[name][key])} ({name})"]
+        lines.append([f"`{board}`", *cells])
+    head = ["18 scenes", "corners", "the best other", "RMS error", "the best other", "CPU time", "the best other"]
+    return table(head, lines)
+
+
+def is_comparable(of, ours):
+    """Whether a detector finds so many corners that its errors and times can be compared."""
+    return of["found"] >= 0.5 * ours["found"]
 
 
 def plot(results, path):
@@ -270,9 +300,9 @@ def failed_claims(results, measures):
                 continue
             for name, of in of_board.items():
                 # Few corners are easy ones: their error is not comparable.
-                if of[measure] is None or (measure in ("rms_px", "over_bound") and of["found"] < 0.5 * ours["found"]):
+                if of[measure] is None or (measure in ("rms_px", "over_bound") and not is_comparable(of, ours)):
                     continue
-                is_ahead = of[measure] < ours[measure] if measure in lower_is_better else of[measure] > ours[measure]
+                is_ahead = of[measure] < least(ours[measure]) if measure in lower_is_better else of[measure] > ours[measure]
                 if is_ahead:
                     yield f"{board}, {measure}: {name} {of[measure]:.4g}, deltille {ours[measure]:.4g}"
 
@@ -292,8 +322,13 @@ def main():
     parser.add_argument("--write", action="store_true", help="replace the tables of docs/benchmarks.md, the plot and results.json")
     parser.add_argument("--check", action="store_true", help="check the committed tables")
     given = parser.parse_args()
-    results = json.loads(RESULTS.read_text()) if given.check or not given.folder else collected(given.folder)
+    if given.check and given.folder:
+        parser.error("--check: checks the committed tables; a folder is not read")
+    results = collected(given.folder) if given.folder else json.loads(RESULTS.read_text())
     results = json.loads(json.dumps(results), parse_float=lambda text: float(f"{float(text):.5g}"))
+    scenes = min(len(row["scenes"]) for row in results["detectors"])
+    if given.write and (scenes, {row["board"] for row in results["detectors"]}) != (len(protocol.SCENES), set(protocol.BOARDS)):
+        sys.exit(f"{given.folder}: --write needs all scenes and boards")
     texts = {DOCUMENT: written(results), README: for_readme(results)}
     if given.write:
         RESULTS.write_text(lines(results))
