@@ -26,6 +26,11 @@ def grey(image):
     return image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
 
 
+def of_board(corners):
+    """Those of the board: not of other grids, which are far away in rows, and not without a label."""
+    return [of for of in corners if of[0].get("id", 0) >= 0 and of[0].get("row", 0) < 1000]
+
+
 class Detector:
     boards = ()
     package = None

@@ -10,6 +10,7 @@ The bound is the mean distance of an unbiased estimate with the least covariance
 anything but the pattern, in a circle up to the nearest corners; rounding to grey levels counts as noise.
 """
 
+import itertools
 import json
 import pathlib
 import subprocess
@@ -107,7 +108,8 @@ def main(program, folder):
     table = {}
     for condition, (square, blur, noise) in protocol.FIXTURES.items():
         rng = np.random.default_rng(protocol.SEED)
-        places = [(CENTRE + x / protocol.OFFSETS, CENTRE + y / protocol.OFFSETS) for x in range(protocol.OFFSETS) for y in range(protocol.OFFSETS)]
+        steps = CENTRE + np.arange(protocol.OFFSETS) / protocol.OFFSETS
+        places = list(itertools.product(steps, steps))
         pictures = [image(square, blur, noise, *at, rng) for at in places]
         table[condition] = {"bound": mean_bound(square, blur, noise)}
         for name, refine in refiners(program, square):

@@ -146,9 +146,7 @@ def one(folder, board, name):
             begin = measured.cpu_s()
             corners = detect(image)
             times.append(1e9 * (measured.cpu_s() - begin) / (image.shape[0] * image.shape[1]))
-        # Not those of other grids, and not those without a label.
-        own = [of for of in corners if of[0].get("id", 0) >= 0 and of[0].get("row", 0) < 1000]
-        found.append([{"label": label, "x": float(x), "y": float(y)} for label, x, y, _ in own])
+        found.append([{"label": label, "x": float(x), "y": float(y)} for label, x, y, _ in detectors.of_board(corners)])
     print(json.dumps({"version": detector.version(), "photographs": found, "ms_per_mpx": float(np.median(times))}))
 
 
