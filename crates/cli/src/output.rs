@@ -5,33 +5,94 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 
+use crate::terminal;
 use deltille::export::kind::Kind;
 use deltille::export::{atomic, staging};
 use deltille::limits::{Limits, ReadError};
 use deltille_core::words::shown;
 
-/// Returns the file that `-o` means: the path itself if it ends in the extension, otherwise `<stem>.<extension>` in
-/// that folder. A path with another extension is not a folder, unless it exists as one.
-pub fn file(output: &Path, stem: &str, extension: &str) -> anyhow::Result<PathBuf> {
-    let shown = output.display();
+/// What `-o` means: a folder, or a file in it.
+#[derive(Debug, PartialEq)]
+pub struct Place {
+    /// The folder.
+    pub folder: PathBuf,
+    /// The file, if one is named.
+    pub file: Option<NamedFile>,
+}
+
+/// Name of an output file, without its folder.
+#[derive(Debug, PartialEq)]
+pub struct NamedFile {
+    /// The name without its extension.
+    pub stem: String,
+    /// The extension, in lower case.
+    pub ending: String,
+}
+
+/// Returns what `-o` means: a file if it ends in one of these extensions of the command, otherwise a folder. A new path with
+/// the extension of another kind of file is rejected.
+pub fn place(output: &Path, endings: &[&str]) -> anyhow::Result<Place> {
     check_is_path(output).context("-o")?;
-    if output.is_dir() {
-        return Ok(output.join(format!("{stem}.{extension}")));
+    let is_folder = output.is_dir() || output.as_os_str().to_string_lossy().ends_with('/');
+    let ending = output.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    let known: Vec<String> = endings.iter().map(|ending| format!(".{ending}")).collect();
+    let (shown, without) = (output.display(), output.with_extension(""));
+    if !known.is_empty() && !output.is_dir() && output.exists() && ending.is_empty() {
+        bail!(
+            "-o {shown} is not a folder; expected a folder, or a file that ends in {}",
+            any_of(&known)
+        );
     }
-    if output.exists() && output.extension().is_none() {
-        bail!("-o {shown} is not a folder; expected a folder, or a file that ends in .{extension}");
+    if is_folder || ending.is_empty() || !is_of_file(&ending, endings) {
+        check_folder(output).context("-o")?;
+        return Ok(Place { folder: output.to_owned(), file: None });
     }
-    match output.extension() {
-        Some(found) if found == extension => Ok(output.to_owned()),
-        Some(_) if !output.as_os_str().to_string_lossy().ends_with('/') => {
-            let instead = output.with_extension(extension);
-            bail!(
-                "-o {shown}: the output is a .{extension} file; use {}, or a folder",
-                instead.display()
-            )
-        }
-        _ => Ok(output.join(format!("{stem}.{extension}"))),
+    ensure!(
+        !known.is_empty(),
+        "-o: {shown} looks like a file, but a folder is needed, such as {}",
+        without.display()
+    );
+    ensure!(
+        endings.contains(&ending.as_str()),
+        "-o {shown}: this command does not write .{ending} files; use {}{}, or a folder",
+        without.display(),
+        any_of(&known),
+    );
+    let stem = output.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let file = Some(NamedFile { stem, ending });
+    Ok(Place { folder: folder_of(output).to_owned(), file })
+}
+
+/// Returns the stem of the output files, and the extension of the file given by `-o` (empty without one). Rejects a `--name` that
+/// differs from the stem of that file.
+pub fn named_by(
+    name: Option<String>,
+    file: Option<NamedFile>,
+) -> anyhow::Result<(Option<String>, String)> {
+    let Some(NamedFile { stem, ending }) = file else { return Ok((name, String::new())) };
+    match name.filter(|name| *name != stem) {
+        Some(name) => bail!(
+            "--name: -o already names the files {stem}; remove --name {name}, or use a folder as -o"
+        ),
+        None => Ok((Some(stem), ending)),
     }
+}
+
+/// Joins alternatives: `a, b or c`.
+fn any_of(words: &[String]) -> String {
+    match words {
+        [before @ .., last] if !before.is_empty() => format!("{} or {last}", before.join(", ")),
+        words => words.concat(),
+    }
+}
+
+/// Returns the file that `-o` means, see [`place`]: in a folder, `<stem>.<extension>`.
+pub fn file(output: &Path, stem: &str, extension: &str) -> anyhow::Result<PathBuf> {
+    let Place { folder, file } = place(output, &[extension])?;
+    Ok(match file {
+        Some(_) => output.to_owned(),
+        None => folder.join(format!("{stem}.{extension}")),
+    })
 }
 
 /// Returns the path of the page of `--report`: a file that ends in .html, or a folder. Rejects unusable paths before the work
@@ -82,25 +143,57 @@ pub(crate) fn line(text: &str) -> String {
     format!("{}\n", shown(text))
 }
 
-/// Prints a [`line`]; returns the error from the calling function.
+/// Prints a line of the result.
+pub(crate) fn print_line(text: &str) -> anyhow::Result<()> {
+    print(&terminal::coloured(&line(text), &std::io::stdout()))
+}
+
+/// Prints a [`line`] of the result; returns the error from the calling function.
 macro_rules! say {
     ($($argument:tt)*) => {
-        $crate::output::print(&$crate::output::line(&format!($($argument)*)))?
+        $crate::output::print_line(&format!($($argument)*))?
     };
 }
 pub(crate) use say;
 
+/// Prints a [`line`] about work that succeeded, such as a written file, unless `--quiet` is given.
+macro_rules! report {
+    ($($argument:tt)*) => {
+        if !$crate::terminal::is_quiet() {
+            $crate::output::say!($($argument)*)
+        }
+    };
+}
+pub(crate) use report;
+
+/// Prints a line on standard error; with `--quiet`, only warnings and errors.
+pub(crate) fn log_line(text: &str) {
+    let is_needed =
+        ["error:", "warning:", "interrupted:"].iter().any(|start| text.starts_with(start));
+    if is_needed || !terminal::is_quiet() {
+        // Standard error may be closed.
+        let mut stderr = std::io::stderr();
+        let _ = stderr.write_all(terminal::coloured(&line(text), &std::io::stderr()).as_bytes());
+    }
+}
+
 /// Prints a [`line`] on standard error.
 macro_rules! log {
-    ($($argument:tt)*) => {{
-        // Standard error may be closed.
-        let _ = ::std::io::Write::write_all(
-            &mut ::std::io::stderr(),
-            $crate::output::line(&format!($($argument)*)).as_bytes(),
-        );
-    }};
+    ($($argument:tt)*) => {
+        $crate::output::log_line(&format!($($argument)*))
+    };
 }
 pub(crate) use log;
+
+/// Prints a [`line`] on standard error with `--verbose`.
+macro_rules! detail {
+    ($($argument:tt)*) => {
+        if $crate::terminal::is_verbose() {
+            $crate::output::log!($($argument)*);
+        }
+    };
+}
+pub(crate) use detail;
 
 /// Output format of a command.
 #[derive(clap::Args, Clone, Copy, Default)]
@@ -207,10 +300,16 @@ pub fn folder_of(path: &Path) -> &Path {
     folder.unwrap_or(Path::new("."))
 }
 
-/// Extensions of files that these programs write, and of photographs. A new folder with such a name was probably
+/// Extensions of files that these programs write, and of images and videos. A new folder with such a name was probably
 /// meant to be a file.
-const OF_FILES: &str = "3mf cameramodel csv dsc dxf glb gltf html jpeg jpg json mtl ndjson npy obj orpc parquet pdf ply \
-                        png sdf stl svg tif tiff toml txt urdf usda xml yaml yml";
+const OF_FILES: &str = "3mf avi bmp c cameramodel csv dsc dxf eps glb gltf h html jpeg jpg json mkv mov mp4 mtl ndjson npy npz \
+                        obj orpc parquet pdf ply png ps py rs sdf step stl stp svg tif tiff toml txt urdf usd usda usdz \
+                        webp xml yaml yml";
+
+/// Whether an extension is one of these, or that of another kind of file.
+fn is_of_file(ending: &str, endings: &[&str]) -> bool {
+    endings.contains(&ending) || OF_FILES.split(' ').any(|known| known == ending)
+}
 
 /// Rejects `-`, which other programs take for standard output.
 fn check_is_path(output: &Path) -> anyhow::Result<()> {
@@ -225,10 +324,11 @@ pub fn check_folder(folder: &Path) -> anyhow::Result<()> {
     if let Some(file) = folder.ancestors().find(|part| part.exists() && !part.is_dir()) {
         bail!("{} is a file, but a folder is needed", file.display());
     }
-    let extension = folder.extension().unwrap_or_default();
-    let is_of_file = OF_FILES.split(' ').any(|known| extension.eq_ignore_ascii_case(known));
+    let extension = folder.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     ensure!(
-        folder.exists() || !is_of_file,
+        folder.exists()
+            || folder.as_os_str().to_string_lossy().ends_with('/')
+            || !is_of_file(&extension, &[]),
         "{} looks like a file, but a folder is needed, such as {}",
         folder.display(),
         folder.with_extension("").display()
@@ -258,6 +358,23 @@ pub(crate) fn fixed(value: f64, places: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_output_is_a_file_only_with_an_ending_of_the_command() {
+        let endings = ["pdf", "svg"];
+        let of =
+            |text: &str| place(Path::new(text), &endings).map_err(|error| format!("{error:#}"));
+        let folder = |text: &str| Ok(Place { folder: text.into(), file: None });
+        for text in ["new", "new/board", "board-1.2", "out.pdf/", "."] {
+            assert_eq!(of(text), folder(text), "{text}");
+        }
+        let file = Some(NamedFile { stem: "desk".to_owned(), ending: "pdf".to_owned() });
+        assert_eq!(of("new/desk.PDF"), Ok(Place { folder: "new".into(), file }));
+        let error = "-o desk.stl: this command does not write .stl files; use desk.pdf or .svg, or a folder";
+        assert_eq!(of("desk.stl"), Err(error.to_owned()));
+        assert!(place(Path::new("desk.json"), &[]).is_err());
+        assert!(of("-").is_err());
+    }
 
     #[test]
     fn zero_has_no_sign() {

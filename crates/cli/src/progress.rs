@@ -5,21 +5,31 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::output::log;
+use crate::terminal;
 use deltille::family::Progress;
 use deltille_core::words::counted;
+
+/// Update interval of the elapsed time and of the spinner.
+const TICK: Duration = Duration::from_millis(200);
 
 /// Creates a bar with position and remaining time, for `total` units of work called `unit`; silent if standard error
 /// is not a terminal.
 pub fn bar(total: u64, unit: &str) -> ProgressBar {
     let position = if unit.is_empty() { String::new() } else { format!("{{human_pos}} {unit}  ") };
     let template = format!(
-        "{{elapsed_precise}} {{wide_bar}} {{percent:>3}} %  {position}{{eta_precise}} left  {{msg}}"
+        "{{spinner}} {{elapsed_precise}} {{wide_bar}} {{percent:>3}} %  {position}{{eta_precise}} left  {{msg}}"
     );
     let style = ProgressStyle::with_template(&template).expect("the template is well formed");
-    ProgressBar::new(total).with_style(style)
+    let bar = ProgressBar::new(total).with_style(style);
+    if terminal::is_quiet() {
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+    } else {
+        bar.enable_steady_tick(TICK);
+    }
+    bar
 }
 
 /// Progress of a code search: a bar on a terminal, otherwise a line every ten seconds.
@@ -84,6 +94,9 @@ impl FrameProgress {
         let style = ProgressStyle::with_template("{elapsed_precise}  {msg}");
         let bar =
             ProgressBar::new_spinner().with_style(style.expect("the template is well formed"));
+        if terminal::is_quiet() {
+            bar.set_draw_target(ProgressDrawTarget::hidden());
+        }
         let start = Instant::now();
         let last = (!std::io::stderr().is_terminal()).then_some(start);
         Self { bar, total, frames: 0, seen: 0, start, last }

@@ -8,8 +8,9 @@ use anyhow::Context;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Command, Parser};
 
-use crate::output::log;
-use crate::{interrupt, wording};
+use crate::deltille::with_short_help;
+use crate::output::{detail, log};
+use crate::{interrupt, terminal, wording};
 use deltille_core::words::{cut, shown, with_short_quotes};
 
 /// Exit code for invalid input of any kind.
@@ -44,13 +45,18 @@ pub fn run_with<A: Parser>(
 ) -> ExitCode {
     interrupt::listen();
     wording::install();
-    let mut command = with_negative_numbers(A::command());
+    let arguments = without_help_of_help(arguments);
+    let mut command = with_short_help(with_negative_numbers(A::command()));
     let parsed = command.try_get_matches_from_mut(&arguments).and_then(|matches| {
         wording::set_command(&command, &matches);
         A::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
     });
     let result = match parsed {
-        Ok(parsed) => program(parsed),
+        Ok(parsed) => {
+            let result = program(parsed);
+            detail!("finished in {:.2} s", terminal::run_time().as_secs_f64());
+            result
+        }
         Err(error) if error.use_stderr() => Err(anyhow::anyhow!(one_line(&error, &arguments))),
         Err(help_or_version) => {
             // If the reader of the help text is gone, there is nothing to report.
@@ -111,6 +117,18 @@ fn with_negative_numbers(command: Command) -> Command {
         .mut_subcommands(with_negative_numbers)
 }
 
+/// Returns the arguments without `--help` after `help`, which means the same.
+fn without_help_of_help(mut arguments: Vec<OsString>) -> Vec<OsString> {
+    if arguments.get(1).is_some_and(|command| command == "help") {
+        arguments.retain(|argument| argument != "--help" && argument != "-h");
+    }
+    arguments
+}
+
+/// Options of other programs and of other commands of this one, and the option that does the same.
+const INSTEAD: [(&str, &str); 3] =
+    [("--dxf", "--laser dxf"), ("--glb", "--gltf"), ("--squares", "--rows and --cols")];
+
 /// Returns the first paragraph of a clap message and its tip on one line.
 fn one_line(error: &clap::Error, arguments: &[OsString]) -> String {
     if error.kind() == ErrorKind::InvalidUtf8 {
@@ -126,6 +144,23 @@ fn one_line(error: &clap::Error, arguments: &[OsString]) -> String {
     {
         let commands = commands.join(", ");
         return format!("a command is missing: one of {commands} (see --help)");
+    }
+    let text_of = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.as_str()),
+        // The best suggestion is the last one.
+        Some(ContextValue::Strings(texts)) => texts.last().map(String::as_str),
+        _ => None,
+    };
+    if let (Some(unknown), Some(known)) =
+        (text_of(ContextKind::InvalidSubcommand), text_of(ContextKind::SuggestedSubcommand))
+    {
+        return format!("unknown command {}; did you mean {known}?", cut(unknown));
+    }
+    if let (ErrorKind::UnknownArgument, Some(unknown)) =
+        (error.kind(), text_of(ContextKind::InvalidArg))
+        && let Some((_, instead)) = INSTEAD.iter().find(|(given, _)| *given == unknown)
+    {
+        return format!("unknown option {unknown}; did you mean {instead}?");
     }
     let mut text = error.to_string();
     for (_, value) in error.context() {

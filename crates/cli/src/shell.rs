@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::{Command, CommandFactory};
 
-use crate::output::{self, Overwrite, print, say};
+use crate::output::{self, Overwrite, print, report};
 use deltille_core::words::counted;
 
 /// Examples at the end of the help of `deltille completions`.
@@ -50,7 +50,7 @@ pub fn man<P: CommandFactory>(args: Man) -> anyhow::Result<ExitCode> {
     let mut program = P::command();
     program.build();
     let count = pages(&program, program.get_name(), &args.output, args.overwrite)?;
-    say!("wrote {} to {}", counted(count, "page"), args.output.display());
+    report!("wrote {} to {}", counted(count, "page"), args.output.display());
     Ok(ExitCode::SUCCESS)
 }
 

@@ -61,6 +61,7 @@ const fn named(setting: Setting) -> (&'static str, &'static str) {
         Setting::PaperMarginMm => ("deltille board", "--margin"),
         Setting::PaperNote => ("deltille board", "--note"),
         Setting::PaperPacked => ("deltille board", "--pack"),
+        Setting::PaperPages => ("deltille icosahedron", "--pages"),
         Setting::PaperPoster => ("deltille board", "--poster"),
         Setting::PaperSize => ("deltille board", "--paper"),
         Setting::PaperTagIds => ("deltille board", "--tag-ids"),

@@ -81,6 +81,7 @@ settings! {
     PaperMarginMm = "PaperSpec::margin_mm",
     PaperNote = "PaperSpec::note",
     PaperPacked = "PaperSpec::packed",
+    PaperPages = "PaperSpec::pages",
     PaperPoster = "PaperSpec::poster",
     PaperSize = "PaperSpec::size",
     PaperTagIds = "PaperSpec::tag_ids",

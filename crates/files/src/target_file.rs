@@ -4,10 +4,13 @@ use std::path::{Path, PathBuf};
 
 use deltille_core::family::{Family, PAIRS_COUNTED, certify_codes};
 use deltille_core::lattice::GridKind;
-use deltille_core::targets::{FamilyRef, OtherFamily, Target, TargetFileError, TargetIdentity};
+use deltille_core::targets::{
+    FamilyRef, OtherFamily, SCHEMA, Target, TargetFileError, TargetIdentity,
+};
 use deltille_layout::Printing;
 
 use crate::export::dsc::{self, DscError};
+use crate::export::kind::Kind;
 use crate::export::staging;
 use crate::export::tp::{self, TpError};
 use crate::family_file::{self, FamilyFileError};
@@ -27,6 +30,20 @@ pub enum TargetReadError {
         path: PathBuf,
         /// Its extension.
         extension: String,
+    },
+    /// A folder without a target.
+    #[error("{}: no description of a target in this folder: use the .json written with the target", path.display())]
+    NoneIn {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A folder with several targets.
+    #[error("{}: several descriptions of targets in this folder ({}): use one of them", path.display(), names.join(", "))]
+    SeveralIn {
+        /// The folder.
+        path: PathBuf,
+        /// The names of the files.
+        names: Vec<String>,
     },
     /// The leftovers of an interrupted run cannot be cleaned up.
     #[error(transparent)]
@@ -60,12 +77,53 @@ pub enum TargetReadError {
     },
 }
 
-/// Reads a target with its sheets: a `.dsc` by its extension, otherwise JSON. If a `.dsc` has no poses of its boards, they are
+/// Returns the only description of a target in a folder: a JSON file, or a `.dsc` if there is no JSON. Other paths are returned
+/// unchanged.
+///
+/// # Errors
+/// Returns an error if the folder contains no description, or several.
+pub fn find(path: &Path) -> Result<PathBuf, TargetReadError> {
+    if !path.is_dir() {
+        return Ok(path.to_owned());
+    }
+    staging::settle(path).map_err(TargetReadError::Settle)?;
+    let entries = std::fs::read_dir(path)
+        .map_err(|source| ReadError::Io { path: path.to_owned(), source })?;
+    let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    files.sort();
+    let has_extension =
+        |path: &PathBuf, wanted: &str| path.extension().is_some_and(|end| end == wanted);
+    let is_description = |path: &PathBuf| {
+        let text = has_extension(path, "json").then(|| Limits::default().read(path).ok()).flatten();
+        text.is_some_and(|text| Kind::of(&text) == Kind::of_schema(SCHEMA))
+    };
+    let mut found: Vec<PathBuf> =
+        files.iter().filter(|path| is_description(path)).cloned().collect();
+    if found.is_empty() {
+        found = files.into_iter().filter(|path| has_extension(path, "dsc")).collect();
+    }
+    match found.as_slice() {
+        [only] => Ok(only.clone()),
+        [] => Err(TargetReadError::NoneIn { path: path.to_owned() }),
+        several => {
+            let name = |path: &PathBuf| {
+                path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+            };
+            Err(TargetReadError::SeveralIn {
+                path: path.to_owned(),
+                names: several.iter().map(name).collect(),
+            })
+        }
+    }
+}
+
+/// Reads a target with its sheets: a `.dsc` by its extension, otherwise JSON; from a folder, its only description. If a `.dsc` has no poses of its boards, they are
 /// read from the `.tp` with the same stem. Leftovers of killed runs in the folder are cleaned up first.
 ///
 /// # Errors
 /// Returns an error if the file cannot be read, or does not describe a target.
 pub fn read(path: &Path, limits: &Limits) -> Result<Printing, TargetReadError> {
+    let path = &*find(path)?;
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     let path_of = || path.to_owned();
     if MADE.contains(&extension.as_str()) {

@@ -30,5 +30,5 @@ pub use marks::{Label, Logo, LogoPlacement, MAX_LOGO_BYTES};
 pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec, SolidSheets};
 pub use placing::{CHECK_BAR_STROKE_MM, Hinge, edge_numbers, edge_text, tag_range, upright_number};
 pub use planning::{Proposal, Reach, Situation, Unsuited};
-pub use printing::{Printing, largest_edge_mm, usual_edge_mm};
+pub use printing::{Printing, largest_edge_mm, usual_edge_mm, usual_solid_edge_mm};
 pub use sheet::{CheckBar, LineKind, Placement, SheetLayout, SheetLine, SheetPage, SheetText};

@@ -41,6 +41,9 @@ pub struct PaperSpec {
     pub margin_mm: f64,
     /// How the faces of a solid are printed.
     pub solids: SolidSheets,
+    /// Largest number of pages for the net of a solid, which selects the paper if its size is not fixed; `None` prefers a single
+    /// page, and allows any number of pages of the largest paper.
+    pub pages: Option<u32>,
     /// Whether a board that is larger than the paper is split over several pages.
     pub poster: bool,
     /// Whether a sheet contains as many boards as fit, to be cut apart, instead of one.
@@ -96,6 +99,7 @@ impl Default for PaperSpec {
             orientation: Orientation::Auto,
             margin_mm: DEFAULT_MARGIN_MM,
             solids: SolidSheets::default(),
+            pages: None,
             poster: false,
             packed: false,
             note: None,
@@ -178,6 +182,14 @@ impl PaperSize {
 
     fn named(name: &str, [short_mm, long_mm]: [f64; 2]) -> Self {
         Self { name: name.to_owned(), short_mm, long_mm }
+    }
+
+    /// Returns the name of a size of this width and height, mm, in either orientation; `None` if it has none.
+    pub fn name_of_mm(width: f64, height: f64) -> Option<&'static str> {
+        let sides = [width.min(height), width.max(height)];
+        let is_same =
+            |known: &[f64; 2]| (0..2).all(|side| (known[side] - sides[side]).abs() < 0.01);
+        SIZES.iter().find(|(_, known)| is_same(known)).map(|&(name, _)| name)
     }
 
     /// Returns the name.

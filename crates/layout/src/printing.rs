@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::paper::{PaperSpec, SolidSheets};
+use super::paper::{PaperSize, PaperSpec, SolidSheets};
 use crate::marks::{logo_room, tag_ids};
 use crate::placing::arrangement::arrange;
 use crate::placing::poster::Poster;
@@ -15,7 +15,7 @@ use deltille_core::polygon::rectangle;
 use deltille_core::setting::Setting::{BoardEdgeMm, PaperNote, PaperPacked};
 use deltille_core::targets::shipped_family;
 use deltille_core::targets::{
-    BoardSpec, FamilyRef, Panel, Target, TargetError, TargetSpec, fingerprint,
+    BoardSpec, FamilyRef, Panel, SolidSpec, Target, TargetError, TargetSpec, fingerprint,
 };
 
 /// A target, and the sheets on which it is printed.
@@ -129,6 +129,21 @@ impl Printing {
         Cow::Owned(printing)
     }
 
+    /// Describes the pages, such as `page 297 × 210 mm (A4)` or `5 pages 210 × 297 mm (A4)`; empty without sheets.
+    pub fn pages_in_words(&self) -> String {
+        let Some(sheet) = self.sheets.first() else { return String::new() };
+        let page = sheet.pages.first().map_or(sheet, |page| &page.marks);
+        let [width, height] = [page.width_mm, page.height_mm];
+        let pages = match self.page_count() {
+            1 => "page".to_owned(),
+            count => format!("{count} pages"),
+        };
+        let name = PaperSize::name_of_mm(width, height);
+        let name = name.map_or(String::new(), |name| format!(" ({name})"));
+        let [width, height] = [width, height].map(|mm| (mm * 1e3).round() / 1e3);
+        format!("{pages} {width} × {height} mm{name}")
+    }
+
     /// Returns the total number of pages of all sheets.
     pub fn page_count(&self) -> usize {
         self.sheets.iter().map(SheetLayout::page_count).sum()
@@ -239,6 +254,43 @@ fn poster(
 pub fn usual_edge_mm(spec: &BoardSpec, paper: &PaperSpec) -> f64 {
     let fitting = paper.size.as_ref().and_then(|_| largest_edge_mm(spec, paper));
     fitting.unwrap_or(BoardSpec::DEFAULT_EDGE_MM)
+}
+
+/// Returns the default edge of a regular solid, mm. Without a fixed paper size, that is the edge of the published icosahedron.
+/// With a fixed size, it is the largest whole number of millimetres with which the net fits on the allowed number of pages (one
+/// by default), or each face on its page. If nothing fits, building the solid reports the error.
+pub fn usual_solid_edge_mm(spec: &SolidSpec, paper: &PaperSpec) -> f64 {
+    let usual = SolidSpec::new(spec.shape.clone()).edge_mm;
+    // Nets with seams are for solids larger than the paper.
+    let is_fitted =
+        paper.size.is_some() && (paper.solids != SolidSheets::SeamedNet || paper.pages.is_some());
+    if !is_fitted {
+        return usual;
+    }
+    let on_page = PaperSpec {
+        pages: paper.pages.or((paper.solids == SolidSheets::Net).then_some(1)),
+        tag_ids: false,
+        guide_page: false,
+        ..paper.clone()
+    };
+    let fits = |mm: u32| {
+        let untagged =
+            SolidSpec { edge_mm: f64::from(mm), tags: None, square_tags: None, ..spec.clone() };
+        let printing = Printing::build("net", &TargetSpec::Solid(untagged), None, Some(&on_page));
+        let most = on_page.pages.map_or(usize::MAX, |pages| pages as usize);
+        printing.is_ok_and(|printing| printing.page_count() <= most)
+    };
+    // The smallest edges leave no room for tiles.
+    let least = (SolidSpec::MIN_EDGE_MM as u32..200).step_by(5).find(|&mm| fits(mm));
+    let Some(mut fitting) = least else { return usual };
+    let mut step = 1024;
+    while step > 0 {
+        if fits(fitting + step) {
+            fitting += step;
+        }
+        step /= 2;
+    }
+    f64::from(fitting)
 }
 
 /// Returns the largest edge in whole millimetres with which a board fits on paper, or `None` if 5 mm does not fit.

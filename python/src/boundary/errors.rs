@@ -79,6 +79,7 @@ pub fn keyword(setting: Setting) -> String {
         Setting::PaperMarginMm => "margin_mm",
         Setting::PaperNote => "note",
         Setting::PaperPacked => "packed",
+        Setting::PaperPages => "pages",
         Setting::PaperPoster => "poster",
         Setting::PaperSize => "paper",
         Setting::PaperTagIds => "tag_ids",

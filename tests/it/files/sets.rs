@@ -48,16 +48,28 @@ fn a_new_folder_with_the_name_of_a_file_is_refused() {
         let said = String::from_utf8(said.get_output().stderr.clone()).unwrap();
         assert!(said.contains(words) && said.lines().count() == 1, "{args}: {said}");
     };
-    let like_a_file = "-o: out.json looks like a file, but a folder is needed, such as out";
     for args in [
         "board --rows 4 --cols 5",
         "detect --target b.json none.png",
         "undistort --camera c.yaml",
         "rig --camera a=a --camera b=b --target b.json",
+        "calibrate none --target b.json",
     ] {
-        refused(&format!("{args} -o out.json"), like_a_file);
+        refused(
+            &format!("{args} -o out.stp"),
+            "-o out.stp: this command does not write .stp files; use out.",
+        );
     }
-    refused("undistort --camera c.yaml -o /dev/full", "-o: /dev/full");
+    refused(
+        "rectify r.json --pair a,b -o out.yaml",
+        "-o: out.yaml looks like a file, but a folder is needed",
+    );
+    refused(
+        "detect --target b.json none.png other.png -o out.csv",
+        "must be a folder, because several",
+    );
+    refused("board --rows 4 --cols 5 --name c -o d.pdf", "--name: -o already names the files d");
+    refused("undistort --camera c.yaml -o /dev/full", "-o /dev/full");
     let pose = "pose none.png --target b.json --camera c.yaml -o /dev/full";
     refused(
         pose,
@@ -67,6 +79,60 @@ fn a_new_folder_with_the_name_of_a_file_is_refused() {
     // An existing folder is accepted.
     std::fs::create_dir(at.join("out.json")).unwrap();
     deltille(at, "board --rows 4 --cols 5 -o out.json --no-verify").success();
+}
+
+/// The ending of `-o` selects the format, its stem the name; the folder stands for the description in it.
+#[test]
+fn an_output_may_be_a_file_and_a_folder_may_stand_for_its_description() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    deltille(at, "board --rows 5 --cols 6 -o new/desk.svg").success();
+    assert_eq!(names(&at.join("new")), ["desk.json", "desk.svg"]);
+    deltille(at, "icosahedron -o solid/ball.3mf --no-verify").success();
+    assert_eq!(names(&at.join("solid")), ["ball.3mf", "ball.json"]);
+    deltille(at, "verify new").success();
+    std::fs::write(at.join("c.yaml"), Camera::pinhole(640, 480, 1.0).to_yaml()).unwrap();
+    deltille(at, "render new --camera c.yaml --eye 0,0,300 --look-at 0,0,0 -o view.png").success();
+    deltille(at, "detect view.png --target new -o corners.csv --overlay").success();
+    deltille(at, "undistort view.png --camera c.yaml -o straight/view.png").success();
+    assert_eq!(
+        names(&at.join("straight")),
+        [
+            "c-undistorted-opencv.yaml",
+            "c-undistorted-ros.yaml",
+            "c-undistorted.json",
+            "c-undistorted.yaml",
+            "view.png"
+        ]
+    );
+    assert!(at.join("corners.csv").is_file() && at.join("corners.overlay.jpg").is_file());
+    deltille(at, "board --rows 5 --cols 6 --name other -o new --no-verify").success();
+    let said = deltille(at, "verify new").code(2);
+    let said = String::from_utf8_lossy(&said.get_output().stderr).into_owned();
+    assert!(
+        said.contains("several descriptions of targets in this folder (desk.json, other.json)"),
+        "{said}"
+    );
+}
+
+/// `--quiet` leaves errors and results, `--verbose` adds what is read.
+#[test]
+fn quiet_and_verbose_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = |args: &str| {
+        let said = deltille(folder.path(), args);
+        let output = said.get_output();
+        [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text).into_owned())
+    };
+    assert_eq!(said("board --rows 4 --cols 5 -q"), ["", ""]);
+    assert_eq!(said("verify board.json --quiet"), ["", ""]);
+    assert!(!said("plan --size 640x480 --distance 30cm..1m -q")[0].is_empty());
+    assert!(said("verify nothing.json -q")[1].starts_with("error: "));
+    let [_, details] = said("verify board.json -v");
+    assert!(
+        details.contains("read board.json: 1 panel, 20 corners") && details.contains("finished in"),
+        "{details}"
+    );
 }
 
 /// Every command replaces its own files, and nothing else without `--force`.

@@ -43,7 +43,7 @@ fn sheets_are_written_in_every_format_and_verified() {
         "d16h5 --tag-border 0",
         "d16h5 --ids 5-3",
         "d16h5 --ids 99",
-        "d16h5 -o x.pdf",
+        "d16h5 -o x.json",
     ] {
         page.refused(at, &format!("deltag sheet {args}"));
     }

@@ -10,7 +10,7 @@ use crate::common::folder::names;
 use super::holes::holed;
 
 /// Options about output locations, inputs and reporting: they belong to a run, not to a target.
-const OF_A_RUN: [&str; 16] = [
+const OF_A_RUN: [&str; 17] = [
     "template",
     "save-template",
     "with",
@@ -19,6 +19,7 @@ const OF_A_RUN: [&str; 16] = [
     "no-verify",
     "json",
     "quiet",
+    "verbose",
     "help",
     "progress",
     "max-bytes",
@@ -108,7 +109,7 @@ fn every_option_of_a_board_is_in_its_template() {
         "--rows 4 --cols 5 --pdf --logo logo.svg --logo-height 4mm",
         "--rows 4 --cols 5 --mirrored --white White --contour Cut --pdf --laser dxf,svg --kerf 0.2mm",
         "--rows 4 --cols 5 --gltf --obj --sdf --urdf --mjcf --usd --texture 900 --plate 5mm",
-        "--rows 4 --cols 5 --3mf --inlay 0.6mm --plate 0.2in --gltf --texture-dpi 150",
+        "--rows 4 --cols 5 --3mf --inlay 0.6mm --plate 0.2in --bed 180x180 --nozzle 0.6mm --gltf --texture-dpi 150",
         "--rows 4 --cols 5 --laser svg",
         "--rows 4 --cols 5 --edge 40mm --paper A3 --family families/holed.json --hole 1.6mm --laser dxf",
     ];
@@ -126,9 +127,9 @@ fn every_option_of_a_solid_is_in_its_template() {
     let solids = [
         "--edge 12cm --tiles 7 --family d36h9 --tag-spacing 2 --tag-border 1.2 --first-id 4 --tag-ids --pdf --board-id 3",
         "--edge 120mm --dense --svg --png --dpi 210 --per-face --note Lab-3 --name t --guide-page",
-        "--pdf --paper A3 --orientation portrait --margin 9mm --dsc --dsc-dialect original",
+        "--pdf --paper A3 --pages 2 --orientation portrait --margin 9mm --dsc --dsc-dialect original",
         "--pdf --paper A5 --allow-seams --dxf --stl",
-        "--skeleton --panel-thickness 2mm --wall 5mm --rib 9mm --face-margin 12mm --3mf --inlay 0.3mm",
+        "--skeleton --panel-thickness 2mm --wall 5mm --rib 9mm --face-margin 12mm --3mf --inlay 0.3mm --bed 400x400 --nozzle 0.2mm",
         "--gltf --obj --sdf --urdf --mjcf --usd --texture 1500",
         "--edge 100mm",
         "--edge 100mm --untagged --invert --pdf --logo logo.svg --logo-height 4mm --gltf --textures 2",

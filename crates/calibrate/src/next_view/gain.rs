@@ -51,6 +51,8 @@ pub(crate) struct Gain {
     field: Field,
     /// Expected variance of a corner per axis, px².
     variance: f64,
+    /// The least and the largest distance of the corners so far from the camera, mm.
+    pub distances_mm: [f64; 2],
 }
 
 /// The information of one view.
@@ -82,7 +84,7 @@ impl Gain {
     pub(super) fn of(estimate: &Estimate, body: &Body) -> Option<Self> {
         let mut gain = Self::without_views(estimate)?;
         gain.known += &estimate.known.as_ref()?.information;
-        gain.sums = gain.seen_so_far(estimate.cameras.first()?, body);
+        gain.add_views(estimate.cameras.first()?, body);
         Some(gain)
     }
 
@@ -104,7 +106,8 @@ impl Gain {
         let prior = DMatrix::from_diagonal(&DVector::from_fn(unknowns, |i, _| prior(i)));
         let variance = known.corner_variance_px2;
         let sums = Sums::zeros(unknowns);
-        Some(Self { camera, free, shape, known: prior, sums, field, variance })
+        let distances_mm = [f64::INFINITY, 0.0];
+        Some(Self { camera, free, shape, known: prior, sums, field, variance, distances_mm })
     }
 
     /// The information of a view of these points, each with its position in the camera frame, mm, and the variance of its
@@ -146,7 +149,8 @@ impl Gain {
     }
 
     /// Sums over the used corners.
-    fn seen_so_far(&self, found: &CameraEstimate, body: &Body) -> Sums {
+    /// Adds the information of the views so far, and the distances of their corners.
+    fn add_views(&mut self, found: &CameraEstimate, body: &Body) {
         let mut sums = self.sums.clone();
         let mut row = DMatrix::zeros(2, self.unknowns());
         for view in &found.views {
@@ -158,12 +162,14 @@ impl Gain {
                 let index = panel.corners.binary_search_by_key(&place, |of| (of.row, of.col));
                 let Ok(index) = index else { continue };
                 let point = view.pose.apply(panel.corners[index].target_mm);
+                let [least, most] = self.distances_mm;
+                self.distances_mm = [least.min(point.length()), most.max(point.length())];
                 let Some(at) = self.camera.project_with_derivatives(point) else { continue };
                 row.columns_mut(0, self.free.len()).copy_from(&by_parameters(&at, &self.free));
                 sums.add(&row, &by_motion(&at, point), 1.0, false);
             }
         }
-        sums
+        self.sums = sums;
     }
 
     fn unknowns(&self) -> usize {

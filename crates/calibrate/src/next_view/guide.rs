@@ -47,6 +47,10 @@ const TILTS: [f64; 2] = [0.52, 0.87];
 /// camera casts a shadow on nearer boards, and few lenses focus at this distance.
 const NEAREST: f64 = 1.0;
 
+/// Corners may be nearer and farther by this factor than those seen so far: these were in focus, and nothing is known about
+/// other distances. Each view extends the range.
+const FOCUS: f64 = 1.1;
+
 /// Number of directions of a tilt.
 const DIRECTIONS: usize = 8;
 
@@ -84,7 +88,8 @@ pub struct Guide {
     intrinsics: Intrinsics,
     /// The camera assumed before there is an estimate.
     assumed: Camera,
-    distances_mm: [f64; 2],
+    /// The given nearest and farthest distance.
+    distances_mm: [Option<f64>; 2],
     refused: Vec<Placing>,
 }
 
@@ -180,8 +185,7 @@ impl Guide {
         let is_spline = matches!(assumed.lens, Lens::Spline(_));
         let is_image =
             width > 0 && height > 0 && [assumed.width, assumed.height] == [width, height];
-        let distances_mm = [NEAREST * body.reach_mm(), f64::INFINITY];
-        let refused = Vec::new();
+        let (distances_mm, refused) = ([None; 2], Vec::new());
         (!is_spline && is_image).then_some(Self {
             body,
             intrinsics,
@@ -191,13 +195,25 @@ impl Guide {
         })
     }
 
-    /// Sets the nearest and the farthest distance, mm, at which boards can be held and are in focus. The defaults are
-    /// half of the board's diagonal, and the largest distance at which corners are found.
+    /// Sets the nearest and the farthest distance of corners, mm, at which they are in focus. By default, a corner may be up to
+    /// 10 % nearer or farther than all corners of the views so far, and the board is not nearer than half of its diagonal.
     #[must_use]
     pub fn within_mm(self, nearest: Option<f64>, farthest: Option<f64>) -> Self {
-        let [near, far] = self.distances_mm;
-        let distances_mm = [nearest.unwrap_or(near), farthest.unwrap_or(far)];
-        Self { distances_mm, ..self }
+        Self { distances_mm: [nearest, farthest], ..self }
+    }
+
+    /// The nearest and the farthest distance of the board's centre, mm.
+    fn of_centre_mm(&self) -> [f64; 2] {
+        let [nearest, farthest] = self.distances_mm;
+        let nearest = nearest.unwrap_or_else(|| NEAREST * self.body.reach_mm());
+        [nearest, farthest.unwrap_or(f64::INFINITY)]
+    }
+
+    /// The nearest and the farthest distance of corners that are in focus, mm: as given, or as seen so far.
+    fn in_focus_mm(&self, gain: &Gain) -> [f64; 2] {
+        let [nearest, farthest] = self.distances_mm;
+        let [least, most] = gain.distances_mm;
+        [nearest.unwrap_or(least / FOCUS), farthest.unwrap_or(most * FOCUS)]
     }
 
     /// Avoids views similar to these, which cannot be taken, for example because a wall is in the
@@ -266,13 +282,13 @@ impl Guide {
         };
         let placing = Placing { at, distance_mm: 1.0, tilt, away, roll: 0.0 };
         let placing = placing.filling(FIRST_FILL, camera, &self.body);
+        let [nearest, farthest] = self.of_centre_mm();
         let placing = placing.map(|placing| Placing {
-            distance_mm: placing.distance_mm.max(self.distances_mm[0]).min(self.distances_mm[1]),
+            distance_mm: placing.distance_mm.max(nearest).min(farthest),
             ..placing
         });
         placing.and_then(|placing| self.view(camera, placing)).unwrap_or_else(|| {
             // Every lens images the centre of the image.
-            let [nearest, farthest] = self.distances_mm;
             let distance_mm = 1000.0f64.max(nearest).min(farthest);
             let placing = Placing { distance_mm, ..UPRIGHT };
             let camera_from_target = placing.pose(camera, &self.body).unwrap_or(Pose::IDENTITY);
@@ -304,7 +320,7 @@ impl Guide {
     /// The projection uncertainty with an additional view; `None` if the board cannot be held or
     /// found there.
     fn judge(&self, gain: &Gain, placing: &Placing) -> Option<f64> {
-        let [nearest, farthest] = self.distances_mm;
+        let [nearest, farthest] = self.of_centre_mm();
         let is_far_enough = (nearest..=farthest).contains(&placing.distance_mm);
         let is_in_image = placing.at.cmpge(DVec2::ZERO).all() && placing.at.cmple(DVec2::ONE).all();
         let is_refused = self.refused.iter().any(|refused| placing.is_like(refused));
@@ -314,6 +330,10 @@ impl Guide {
         }
         let pose = placing.pose(&gain.camera, &self.body)?;
         let seen = self.body.seen(&gain.camera, &pose, false)?;
+        let [nearest, farthest] = self.in_focus_mm(gain);
+        if !seen.iter().all(|seen| (nearest..=farthest).contains(&seen.point.length())) {
+            return None;
+        }
         gain.with_px(&self.body, &seen, &DMat3::from_quat(pose.rotation))
     }
 

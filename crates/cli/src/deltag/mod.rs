@@ -25,6 +25,7 @@ use self::draw::{sheet, show};
 use self::exchange::{export, import};
 use self::search::{bounds, frontier, gen_family, plan};
 use crate::shell;
+use crate::terminal::Verbosity;
 
 /// Search, check, list and draw DelTag code families.
 #[derive(Parser)]
@@ -32,6 +33,8 @@ use crate::shell;
 pub struct Deltag {
     #[command(subcommand)]
     command: Command,
+    #[command(flatten)]
+    verbosity: Verbosity,
 }
 
 #[derive(Subcommand)]
@@ -72,6 +75,7 @@ enum Command {
 
 /// Runs the program.
 pub fn run(deltag: Deltag) -> anyhow::Result<ExitCode> {
+    deltag.verbosity.set();
     match deltag.command {
         Command::GenFamily(args) => gen_family::run(args),
         Command::VerifyFamily(args) => verify_family::run(args),

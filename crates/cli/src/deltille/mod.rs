@@ -9,12 +9,14 @@
 //! 4. `apply` uses the calibrated cameras: target poses, robots, undistorted images.
 //! 5. `measure` evaluates the library itself.
 //!
-//! `files` contains the input and output shared by all of them, and `examples` the end of each command's help.
+//! `files` contains the input and output shared by all of them, and `examples` the end of each command's help,
+//! and `first_options` the options that its short form lists.
 
 mod apply;
 mod calibrate;
 mod examples;
 pub(crate) mod files;
+mod first_options;
 mod make;
 mod measure;
 mod see;
@@ -29,9 +31,11 @@ use self::make::{aprilgrid, board, charuco, circles, plan, solid, verify};
 use self::measure::{bench, experiment};
 use self::see::{detect, refine, render};
 use crate::shell;
+use crate::terminal::Verbosity;
 use deltille::lattice::GridKind;
 use deltille::targets::SolidShape;
 
+pub use self::first_options::with_short_help;
 pub use self::make::BoardSettings;
 
 /// Make, verify and detect calibration targets, and calibrate cameras.
@@ -40,6 +44,8 @@ pub use self::make::BoardSettings;
 pub struct Deltille {
     #[command(subcommand)]
     command: Command,
+    #[command(flatten)]
+    verbosity: Verbosity,
 }
 
 #[derive(Subcommand)]
@@ -63,16 +69,16 @@ enum Command {
     /// Make a circle grid, symmetric or asymmetric, for OpenCV
     #[command(after_help = examples::CIRCLES)]
     Circles(Box<circles::Args>),
-    /// Make a tetrahedron with tagged boards on its faces: a mesh, and files to print
+    /// Make a tetrahedron with tagged boards on its faces: a net to print (PDF) and a mesh (glTF)
     #[command(after_help = examples::SOLID)]
     Tetrahedron(Box<solid::Args>),
-    /// Make an octahedron with tagged boards on its faces
+    /// Make an octahedron with tagged boards on its faces: a net to print (PDF) and a mesh (glTF)
     #[command(after_help = examples::SOLID)]
     Octahedron(Box<solid::Args>),
-    /// Make an icosahedron with tagged boards on its faces
+    /// Make an icosahedron with tagged boards on its faces: a net to print (PDF) and a mesh (glTF)
     #[command(after_help = examples::SOLID)]
     Icosahedron(Box<solid::Args>),
-    /// Make a cube with tagged checkerboards on its faces
+    /// Make a cube with tagged checkerboards on its faces: a net to print (PDF) and a mesh (glTF)
     #[command(after_help = examples::CUBE)]
     #[command(mut_arg("tiles", |arg| arg.help(solid::squares::TILES)))]
     #[command(mut_arg("family", |arg| arg.help(solid::squares::FAMILY)))]
@@ -80,7 +86,7 @@ enum Command {
     #[command(mut_arg("tag_border", |arg| arg.help(solid::squares::BORDER)))]
     #[command(mut_arg("dense", |arg| arg.hide(true)), mut_arg("hole", |arg| arg.hide(true)))]
     Cube(Box<solid::Args>),
-    /// Make a cuboid with tagged checkerboards on its faces
+    /// Make a cuboid with tagged checkerboards on its faces: a net to print (PDF) and a mesh (glTF)
     #[command(after_help = examples::CUBOID)]
     #[command(mut_arg("edge", |arg| arg.help(solid::squares::MEAN)))]
     #[command(mut_arg("tiles", |arg| arg.help(solid::squares::TILES)))]
@@ -169,6 +175,7 @@ enum Command {
 
 /// Runs the program.
 pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
+    deltille.verbosity.set();
     match deltille.command {
         Command::Bench(args) => bench::run(args),
         Command::Calibrate(args) => one_camera::run(args),

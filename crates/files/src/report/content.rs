@@ -7,6 +7,7 @@ use crate::report::pictures::sample::Sample;
 use deltille_calibrate::{
     CameraEstimate, Candidate, Diagnosis, Estimate, Messages, PanelPrior, PoseUncertainty,
 };
+use deltille_core::raster::CameraNotes;
 
 /// The contents of the report of a calibration.
 #[derive(Clone, Debug)]
@@ -28,6 +29,8 @@ pub struct Report<'a> {
     /// A photograph of each camera with and without distortion, by index of the camera; see
     /// [`Sample::of`].
     pub samples: BTreeMap<usize, Sample>,
+    /// Metadata of the photographs of each camera, by index of the camera.
+    pub notes: BTreeMap<usize, CameraNotes>,
     /// Lens models compared for each camera; see [`Calibration::compare_models`].
     ///
     /// [`Calibration::compare_models`]: deltille_calibrate::Calibration::compare_models
@@ -40,9 +43,20 @@ impl<'a> Report<'a> {
     /// Creates a report of an estimate without optional contents.
     pub fn new(title: &'a str, estimate: &'a Estimate) -> Self {
         let (diagnoses, stated, print) = (&[], &[], Print::default());
-        let (thumbnails, samples, models) = (BTreeMap::new(), BTreeMap::new(), &[]);
-        let poses = &[];
-        Self { title, estimate, diagnoses, stated, print, thumbnails, samples, models, poses }
+        let (thumbnails, samples, notes) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
+        let (models, poses) = (&[], &[]);
+        Self {
+            title,
+            estimate,
+            diagnoses,
+            stated,
+            print,
+            thumbnails,
+            samples,
+            notes,
+            models,
+            poses,
+        }
     }
 
     /// Whether there are several cameras.

@@ -177,11 +177,11 @@ fn uncertainty(report: &Report) -> String {
 fn target(map: &TargetMap) -> String {
     let [plane, out] = map.rms_mm();
     let cells = cells(&[
-        (format!("{plane:.3} mm"), "in the plane, rms per axis"),
-        (format!("{out:.3} mm"), "out of the plane, rms"),
+        (format!("{plane:.3} mm"), "in the plane, rms per axis".into()),
+        (format!("{out:.3} mm"), "out of the plane, rms".into()),
         (
             format!("{} of {}", map.significant().count(), map.corners().len()),
-            "significant offsets",
+            "significant offsets".into(),
         ),
     ]);
     let svg = target_map::drawing(map, "");

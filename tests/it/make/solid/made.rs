@@ -15,7 +15,7 @@ use deltille::targets::{Target, TargetSpec};
 fn an_icosahedron_needs_no_option() {
     let folder = tempfile::tempdir().unwrap();
     deltille(folder.path(), "icosahedron").success();
-    assert_eq!(names(folder.path()), ["icosahedron.glb", "icosahedron.json"]);
+    assert_eq!(names(folder.path()), ["icosahedron.glb", "icosahedron.json", "icosahedron.pdf"]);
 }
 
 /// The description of the reference programs agrees: corners, tags, positions in space.

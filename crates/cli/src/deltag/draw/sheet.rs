@@ -8,7 +8,7 @@ use anyhow::{Context, ensure};
 use crate::deltag::named::resolve;
 use crate::deltille::files::written::{Formats, drawn, write_all};
 use crate::interrupt;
-use crate::output::{Overwrite, say};
+use crate::output::{self, Overwrite, Place, named_by, report, say};
 use crate::run::{FAILED, Interrupted};
 use crate::values::{Ids, name, whole};
 use deltille::layout::{DEFAULT_MARGIN_MM, PaperSize, PaperSpec, Printing};
@@ -54,7 +54,7 @@ pub struct Args {
     /// Resolution of the PNG, dots per inch [default: 300]
     #[arg(long, value_parser = whole(150..=2400u32))]
     dpi: Option<u32>,
-    /// Output folder
+    /// Output folder, or a file: its ending selects the format
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
     /// Stem of the file names [default: the family's name followed by -sheet]
@@ -81,12 +81,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         },
         ..PaperSpec::default()
     };
-    ensure!(args.dpi.is_none() || args.png, "--dpi needs --png");
-    ensure!(
-        args.output.is_dir() || args.output.extension().is_none(),
-        "-o {} must be a folder; set the file names with --name",
-        args.output.display()
-    );
+    let Place { folder, file } = output::place(&args.output, &["pdf", "svg", "png"])?;
+    let (named, ending) = named_by(args.name, file)?;
+    let [pdf, svg, png] = [("pdf", args.pdf), ("svg", args.svg), ("png", args.png)]
+        .map(|(format, is_asked)| is_asked || ending == format);
+    ensure!(args.dpi.is_none() || png, "--dpi needs --png");
     if let Some(ids) = &args.ids {
         ids.check(&family)?;
     }
@@ -101,7 +100,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         border_bits: args.tag_border,
     };
     let count = spec.ids.len();
-    let name = args.name.unwrap_or_else(|| format!("{}-sheet", family.name()));
+    let name = named.unwrap_or_else(|| format!("{}-sheet", family.name()));
     let target = Printing::build(&name, &TargetSpec::Tags(spec), Some(&family), Some(&paper))?;
     let pages = target.sheets.len();
     ensure!(
@@ -110,13 +109,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
          --ids 0-99), or use a smaller --edge or larger --paper"
     );
 
-    let formats =
-        Formats { pdf: args.pdf || !(args.svg || args.png), svg: args.svg, png: args.png };
+    let formats = Formats { pdf: pdf || !(svg || png), svg, png };
     let artwork = target.draw()?;
     let files = drawn(&name, artwork, formats, args.dpi.unwrap_or(300));
-    let written = write_all(&args.output, &files, args.overwrite)?;
+    let written = write_all(&folder, &files, args.overwrite)?;
     for path in &written {
-        say!("wrote {}", path.display());
+        report!("wrote {}", path.display());
     }
     if args.no_verify {
         return Ok(ExitCode::SUCCESS);

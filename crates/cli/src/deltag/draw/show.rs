@@ -4,7 +4,7 @@ use std::process::ExitCode;
 use anyhow::Context;
 
 use crate::deltag::named::resolve;
-use crate::output::{self, Overwrite, say};
+use crate::output::{self, Overwrite, Place, named_by, report};
 use crate::values::{Ids, name, whole};
 use deltille::artwork::{Artwork, GalleryTile, tag_gallery};
 use deltille::export::kind::Kind;
@@ -34,7 +34,7 @@ pub struct Args {
     #[arg(long, default_value_t = 5,
           value_parser = whole(1..=100u16))]
     columns: u16,
-    /// Output folder, or the output file if there is only one
+    /// Output folder, or a file: its ending selects the format
     #[arg(short, long, default_value = ".")]
     output: PathBuf,
     /// Stem of the file names [default: the family's name]
@@ -53,12 +53,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         ids.len() <= MAX_TAGS,
         "--ids: at most {MAX_TAGS} tags fit in one image; use `deltag sheet` for more"
     );
-    anyhow::ensure!(args.dpi.is_none() || args.png, "--dpi needs --png");
-    let stem = args.name.as_deref().unwrap_or(family.name());
-    let svg = args.svg || !args.png;
-    let place = |extension| output::file(&args.output, stem, extension);
-    let png_path = args.png.then(|| place("png")).transpose()?;
-    let svg_path = svg.then(|| place("svg")).transpose()?;
+    let Place { folder, file } = output::place(&args.output, &["svg", "png"])?;
+    let (named, ending) = named_by(args.name, file)?;
+    let png = args.png || ending == "png";
+    anyhow::ensure!(args.dpi.is_none() || png, "--dpi needs --png");
+    let stem = named.as_deref().unwrap_or(family.name());
+    let place = |extension| folder.join(format!("{stem}.{extension}"));
+    let png_path = png.then(|| place("png"));
+    let svg_path = (args.svg || !png || ending == "svg").then(|| place("svg"));
     let kinds = [(&png_path, Kind::own_printed_png()), (&svg_path, Kind::of(svg::HEAD.as_bytes()))];
     for (path, kind) in kinds {
         let Some(path) = path else { continue };
@@ -82,7 +84,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         written.push(path);
     }
     for path in written {
-        say!("wrote {}", path.display());
+        report!("wrote {}", path.display());
     }
     Ok(ExitCode::SUCCESS)
 }

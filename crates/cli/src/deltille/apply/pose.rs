@@ -22,6 +22,7 @@ use deltille::export::sheet::Sheet;
 use deltille::frames::Frame;
 use deltille::limits::Limits;
 use deltille::targets::Target;
+use deltille_core::words::counted;
 
 /// Arguments of `deltille pose`.
 #[derive(clap::Args)]
@@ -141,7 +142,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let found = all - without;
     if interrupt::is_raised() && found == 0 {
-        return Err(Interrupted(format!("target found in 0 of {all} images")).into());
+        return Err(Interrupted(format!("target found in 0 of {}", counted(all, "image"))).into());
     }
     if all == 0 {
         bail!("no images to process");
@@ -151,10 +152,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     if let Some(path) = &path {
         output::write(path, lines.as_bytes(), args.overwrite)?;
-        say!("{}: target found in {found} of {all} images", path.display());
+        say!("{}: target found in {found} of {}", path.display(), counted(all, "image"));
     }
     if interrupt::is_raised() {
-        return Err(Interrupted(format!("poses of the first {all} images")).into());
+        return Err(Interrupted(format!("poses of the first {}", counted(all, "image"))).into());
     }
     Ok(if without > 0 { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })
 }

@@ -15,7 +15,7 @@ use crate::deltille::files::written::{
     File, Staged, bytes_file, check_places, same_file, sample_of, text_file,
 };
 use crate::deltille::files::{camera_file, images_at_once};
-use crate::output::{self, Overwrite, say};
+use crate::output::{self, Overwrite, Place, report, say};
 use crate::run::{self, BAD_INPUT, FAILED, Interrupted};
 use crate::values::distance;
 use crate::{interrupt, progress};
@@ -44,7 +44,7 @@ struct ViewArgs {
     /// Also write the remap tables for OpenCV's remap, as float32 arrays for NumPy
     #[arg(long)]
     maps: bool,
-    /// Output folder
+    /// Output folder; for the undistorted image of one photograph, also a file such as straight.png
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
     #[command(flatten)]
@@ -161,7 +161,17 @@ impl ViewArgs {
 }
 
 /// Creates a pinhole view of a camera, and undistorts its images.
-pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
+    let images = Images::of(&args.images)?;
+    let Place { folder, file } = output::place(&args.view.output, &["png"])?;
+    ensure!(
+        file.is_none() || (images.is_single() && images.count().is_some()),
+        "-o: {} is one file, but there is not exactly one photograph; use a folder",
+        args.view.output.display()
+    );
+    let stem_of_one = file.map(|file| file.stem);
+    args.view.output = folder;
+    let args = args;
     let (found, failed) = camera_file::read_calibration("--camera", &args.camera)?;
     let [known] = found.cameras.as_slice() else {
         bail!(
@@ -175,10 +185,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let stem = format!("{stem}-undistorted");
     let made = Undistortion::new(&camera, args.view.size_of(&camera)?, args.view.field);
     let made = made.context("--field")?;
-    let images = Images::of(&args.images)?;
     let (folder, end) = (args.view.output.as_path(), "undistorted");
     let options = args.recording.options(args.view.limits.limits(), &images)?;
-    let pictures = Pictures { args: &args.view, options, folder, camera: &camera, end };
+    let pictures =
+        Pictures { args: &args.view, options, folder, camera: &camera, end, stem_of_one };
     pictures.check(&images)?;
     let map = args.view.map(&made);
     let view = CameraFile { camera: made.view().clone(), calibrated_with, failed };
@@ -237,16 +247,20 @@ struct Pictures<'a> {
     camera: &'a Camera,
     /// Suffix of the image names.
     end: &'static str,
+    /// Stem of the only image.
+    stem_of_one: Option<String>,
 }
 
 impl Pictures<'_> {
     fn place(&self, stem: &str) -> PathBuf {
-        self.folder.join(format!("{stem}-{}.png", self.end))
+        match &self.stem_of_one {
+            Some(stem) => self.folder.join(format!("{stem}.png")),
+            None => self.folder.join(format!("{stem}-{}.png", self.end)),
+        }
     }
 
     /// Rejects outputs that could not be written, before the work starts.
     fn check(&self, images: &Images) -> anyhow::Result<()> {
-        output::check_folder(self.folder).context("-o")?;
         let mut stems = Stems::default();
         // The frames of recordings are not known yet.
         images.named().iter().filter(|image| !is_recording(image)).try_for_each(|image| {
@@ -289,7 +303,7 @@ impl Pictures<'_> {
         failed.values().for_each(run::report);
         let failed = failed.len();
         if done > 0 {
-            say!("wrote {} to {}", counted(done, "image"), self.folder.display());
+            report!("wrote {} to {}", counted(done, "image"), self.folder.display());
         } else if is_new {
             // Removes the folder only if it is empty.
             let _ = fs::remove_dir(self.folder);
@@ -342,10 +356,10 @@ impl Made {
             };
         }
         for path in staged.commit()? {
-            say!("wrote {}", path.display());
+            report!("wrote {}", path.display());
         }
         if is_left {
-            return Err(Interrupted(format!("{done} images were written")).into());
+            return Err(Interrupted(format!("{} written", counted(done, "image"))).into());
         }
         Ok(if failed > 0 { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })
     }
@@ -353,6 +367,7 @@ impl Made {
 
 /// Creates rectified views of two cameras of a rig, and rectifies their images.
 pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
+    output::place(&args.view.output, &[])?;
     let (found, failed) = read_rig(&args.rig)?;
     let Estimate { cameras, calibrated_with, .. } = found;
     let named = |name: &String| {
@@ -386,6 +401,7 @@ pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
         folder: &folders[index],
         camera: cameras[index].0,
         end: "rectified",
+        stem_of_one: None,
     };
     of_camera(0).check(&images[0])?;
     of_camera(1).check(&images[1])?;

@@ -8,7 +8,7 @@ use std::time::{Duration, SystemTime};
 use anyhow::{Context, bail, ensure};
 
 use super::sightings::{self, GridArgs, SheetArgs};
-use super::solving::ModelChoice;
+use super::solving::{ModelChoice, projection_uncertainty};
 use crate::deltille::files::images::photographs_in;
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::written::{check_places, sample_of, text_file};
@@ -58,11 +58,11 @@ pub struct Args {
     /// Also estimate how the board is bent, and choose views for that
     #[arg(long, conflicts_with = "shape")]
     board_shape: bool,
-    /// Shortest distance at which the board is in focus, such as 30cm [default: half the board's
-    /// diagonal]
+    /// Shortest distance at which the board is in focus, such as 30cm [default: 10 % less than that of any corner so
+    /// far]
     #[arg(long, value_name = "LENGTH", value_parser = distance)]
     nearest: Option<f64>,
-    /// Farthest distance, such as 2m [default: unlimited]
+    /// Farthest distance, such as 2m [default: 10 % more than that of any corner so far]
     #[arg(long, value_name = "LENGTH", value_parser = distance)]
     farthest: Option<f64>,
     /// Stop at this projection uncertainty over the whole image, px [default: when the next view would lower the
@@ -451,8 +451,13 @@ impl Watch<'_> {
         let is_enough = next.is_enough(self.args.until);
         let views = counted(count, "view");
         match (&estimate, next.now_px) {
-            (Ok(_), Some(now)) => {
-                say!("{views}: projection uncertainty (1σ) {now:.4} px over the image")
+            (Ok(estimate), Some(now)) => {
+                say!(
+                    "{views}: projection uncertainty (1σ) over the whole image: {now:.4} px from noise"
+                );
+                if let Some(line) = estimate.cameras.first().and_then(projection_uncertainty) {
+                    say!("{views}: {line}, where corners were seen");
+                }
             }
             (Err(error), _) if count >= ENOUGH_TO_TELL => {
                 say!("{views}: not calibrated yet: {error}")

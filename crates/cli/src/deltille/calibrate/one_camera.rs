@@ -55,7 +55,7 @@ pub struct Args {
     /// Folder of the photographs, for thumbnails in the report
     #[arg(long, value_name = "FOLDER", requires = "report")]
     images: Option<PathBuf>,
-    /// Camera file (.yaml), or a folder for camera.yaml; other files are written beside it with the same stem
+    /// Camera file (.yaml or .json), or a folder for camera.yaml; other files are written beside it with the same stem
     /// [default: camera.yaml, or poses.yaml with --fixed-intrinsics]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -67,8 +67,9 @@ pub struct Args {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     // Poses with a fixed camera must not replace its calibration.
     let stem = if args.fixed_intrinsics.is_some() { "poses" } else { "camera" };
-    let path = output::file(args.output.as_deref().unwrap_or(Path::new(".")), stem, "yaml")?;
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let place = output::place(args.output.as_deref().unwrap_or(Path::new(".")), &["yaml", "json"])?;
+    let stem = place.file.map_or(stem.to_owned(), |file| file.stem);
+    let path = place.folder.join(format!("{stem}.yaml"));
     if let Some(known) = &args.fixed_intrinsics {
         ensure!(
             !same_file(&path, known),
@@ -122,6 +123,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let listed = chosen(&prepared.tried[0]) + &prepared.describe();
     let timing = prepared.file(&stem);
     let mut solved = args.solve.solve(calibration, print, prepared.tried)?;
+    solved.add_notes(0, &detections);
     unnamed.iter().for_each(|note| log!("{note}"));
     ensure!(!solved.estimate.frames.is_empty(), "no view is consistent with this camera");
     let of_test = solved.estimate.held_out.iter().flat_map(|test| &test.excluded);

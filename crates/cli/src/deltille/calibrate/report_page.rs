@@ -49,10 +49,10 @@ impl Calibrated {
                 }
             }
         }
-        let Self { estimate, diagnoses, stated, print, models } = self;
+        let Self { estimate, diagnoses, stated, print, models, notes } = self;
         let mut report = Report::new(title, estimate);
         (report.diagnoses, report.stated) = (diagnoses, stated);
-        (report.print, report.thumbnails) = (*print, thumbnails);
+        (report.print, report.thumbnails, report.notes) = (*print, thumbnails, notes.clone());
         (report.samples, report.models, report.poses) = (samples, models, poses);
         output::write(page, report.html().as_bytes(), overwrite).context("--report")
     }

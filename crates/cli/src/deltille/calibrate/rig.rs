@@ -22,7 +22,7 @@ use crate::deltille::files::written::{
 };
 use crate::deltille::files::{camera_file, target_file};
 use crate::interrupt;
-use crate::output::{Overwrite, check_folder, fixed, log, say};
+use crate::output::{self, Overwrite, fixed, log, report, say};
 use crate::run::{FAILED, report};
 use crate::values::format;
 use deltille::calibrate::{
@@ -67,7 +67,7 @@ pub struct Args {
     #[command(flatten)]
     sheet: SheetArgs,
     /// Also estimate the poses of the target's panels, and write them as <target>-refined.json
-    #[arg(long, conflicts_with_all = ["print_scale", "grid"])]
+    #[arg(long, conflicts_with_all = ["print_scale", "measured", "grid"])]
     refine_target: bool,
     #[command(flatten)]
     solve: SolveArgs,
@@ -77,9 +77,12 @@ pub struct Args {
     /// Output formats in addition to rig.json and <camera>.yaml, separated by commas
     #[arg(long, value_delimiter = ',', value_parser = format(RIG_FORMATS))]
     format: Vec<&'static RigFormat>,
-    /// Output folder for rig.json, <camera>.yaml and the refined target
+    /// Output folder for rig.json, <camera>.yaml and the refined target; or another name of rig.json, such as stereo.json
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
+    /// Stem of rig.json.
+    #[arg(skip = "rig")]
+    stem: String,
     #[command(flatten)]
     limits: ImageLimits,
     #[command(flatten)]
@@ -87,13 +90,20 @@ pub struct Args {
 }
 
 /// Calibrates a rig and writes it.
-pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
+    let place = output::place(&args.output, &["json"])?;
+    args.output = place.folder;
+    args.stem = place.file.map_or(args.stem, |file| file.stem);
     let sources = args.cameras.sources(&[], args.refine_target)?;
     let names: Vec<&str> = sources.iter().map(|source| source.name.as_str()).collect();
     for (option, given) in [("--known", &args.known), ("--images", &args.images)] {
         check_named(option, given.iter().map(|(name, _)| name.as_str()), &names)?;
     }
-    check_folder(&args.output).context("-o")?;
+    ensure!(
+        !names.contains(&args.stem.as_str()),
+        "-o: {0}.json is not a file of the rig, because one of its cameras is called {0}; use another name",
+        args.stem
+    );
     let limits = args.limits.limits();
     let (printed, grid) = match args.grid.read_target()? {
         Some((grid, target)) => (vec![target.into()], Some(grid)),
@@ -113,10 +123,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         checked.with_context(|| format!("camera {name}"))?;
     }
     args.check_files(&names, &cameras, &printed)?;
-    let own = args.output.join("rig.json");
+    let own = args.output.join(format!("{}.json", args.stem));
     let own: Vec<&Path> = args.target.iter().chain([&own]).map(PathBuf::as_path).collect();
     args.solve.covariance.check(args.overwrite, &own)?;
-    let page = args.solve.page("rig", args.overwrite)?;
+    let page = args.solve.page(&args.stem, args.overwrite)?;
     let mut calibration = Calibration::of(&reference, panels).refine_panels(args.refine_target);
     let (mut left_out, mut ink, mut seen) = (Vec::new(), Vec::new(), Vec::new());
     let (given, mut times) = (args.given(&sources, &reference, &cameras, &limits)?, Vec::new());
@@ -161,9 +171,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let listed = names.iter().zip(&prepared.tried).filter(|(_, tried)| !tried.is_empty());
     let listed = listed.map(|(name, tried)| format!("{name}:\n{}", chosen(tried)));
     let mut text = listed.collect::<String>() + &prepared.describe();
-    let timing = prepared.file("rig");
+    let timing = prepared.file(&args.stem);
     let print = Print { scale: sheet.print_scale, ink: InkEstimate::of_all(&ink) };
     let mut solved = args.solve.solve(calibration, print, prepared.tried)?;
+    for (index, (_, detections)) in seen.iter().enumerate() {
+        solved.add_notes(index, detections);
+    }
     let detections = seen.iter().flat_map(|(_, detections)| detections);
     if let (Some(note), false) = (sightings::unnamed(detections, &reference), args.assume_target) {
         log!("{note}");
@@ -190,7 +203,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut written = write_all(&args.output, &files, args.overwrite)?;
     if let Some(page) = page {
         let folders: Vec<_> = names.iter().map(|name| of_name(&args.images, name)).collect();
-        solved.write_page(&page, "rig", &folders, &poses, args.overwrite)?;
+        solved.write_page(&page, &args.stem, &folders, &poses, args.overwrite)?;
         written.push(page);
     }
     written.extend(args.solve.covariance.write(
@@ -202,7 +215,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         say!("{line}");
     }
     for path in written {
-        say!("wrote {}", path.display());
+        report!("wrote {}", path.display());
     }
     if interrupt::has_ended_input() {
         return Ok(ExitCode::from(interrupt::exit_code()));
@@ -295,7 +308,7 @@ impl Args {
         found.map = self.solve.measures_target().then(|| TargetMap::new(Vec::new(), [0.0; 2]));
         let json = sample_of(rig::SCHEMA);
         let (mut files, _) = self.files(&cameras.collect::<Vec<_>>(), &json, &found, printed)?;
-        files.extend(self.solve.estimate_timing.then(|| compensation::planned("rig")));
+        files.extend(self.solve.estimate_timing.then(|| compensation::planned(&self.stem)));
         check_places(&self.output, &files, self.overwrite)?;
         keep_inputs(&self.output, &files, &self.target)
     }
@@ -309,7 +322,7 @@ impl Args {
         printed: &[Printing],
     ) -> anyhow::Result<(Vec<File>, Vec<FormatError>)> {
         let mut refused = Vec::new();
-        let mut files = vec![text_file("rig.json".to_owned(), json.to_owned())];
+        let mut files = vec![text_file(format!("{}.json", self.stem), json.to_owned())];
         let failed = saved::failures(json).into_iter().next();
         for (name, camera, _) in cameras {
             let camera = (*camera).clone();
@@ -325,7 +338,8 @@ impl Args {
             // Only rig.json contains the reason for a failure.
             if !self.format.is_empty() || self.refine_target || found.map.is_some() {
                 log!(
-                    "warning: only rig.json and the cameras were written, because the calibration failed"
+                    "warning: only {}.json and the cameras were written, because the calibration failed",
+                    self.stem
                 );
             }
             return Ok((files, refused));

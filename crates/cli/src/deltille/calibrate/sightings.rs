@@ -23,9 +23,9 @@ use deltille::detect::{Detection, InkEstimate};
 use deltille::export::calibration::Print;
 use deltille::export::sheet::{self, Sheet};
 use deltille::lattice::GridKind;
-use deltille::layout::Printing;
+use deltille::layout::{CheckBar, Printing, SheetLayout};
 use deltille::limits::Limits;
-use deltille::targets::{SIDES, Target, TargetIdentity, parse_length_mm};
+use deltille::targets::{SIDES, Target, TargetIdentity, format_mm, parse_length_mm};
 use deltille_core::quantity::{edge_mm, print_scale};
 use deltille_core::words::counted;
 
@@ -73,21 +73,48 @@ pub struct GridArgs {
 /// Known properties of the printed sheet.
 #[derive(clap::Args)]
 pub struct SheetArgs {
-    /// Ratio of measured to nominal length of the check bars, horizontal and vertical, such as 0.9973,0.9981,
-    /// or one number for both
+    /// Measured lengths of the check bars, horizontal and vertical, such as 269.3,199.6 (mm), or 10.6in,7.86in; one length is that
+    /// of the horizontal bar, and the ratio applies to both directions
+    #[arg(long, value_name = "ACROSS,UP", value_parser = lengths, allow_hyphen_values = true,
+          conflicts_with = "print_scale")]
+    measured: Option<Lengths>,
+    /// Ratio of measured to nominal length of the check bars, instead of --measured, such as 0.9973,0.9981 or
+    /// 269.3/270,199.6/200, or one for both
     #[arg(long, value_name = "ACROSS,UP", value_parser = scale, allow_hyphen_values = true)]
     print_scale: Option<[f64; 2]>,
     /// Known bend and print scale of the sheet: the .json of `calibrate --board-shape`
-    #[arg(long, value_name = "FILE", conflicts_with = "print_scale")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["print_scale", "measured"])]
     shape: Option<PathBuf>,
+}
+
+/// Measured lengths of the check bars, mm: of the horizontal one, and of the vertical one if it was measured.
+#[derive(Clone, Copy)]
+struct Lengths {
+    across_mm: f64,
+    up_mm: Option<f64>,
+}
+
+fn lengths(text: &str) -> Result<Lengths, String> {
+    let mm = |part: &str| parse_length_mm(part.trim()).map_err(|error| error.to_string());
+    Ok(match text.split_once(',') {
+        Some((across, up)) => Lengths { across_mm: mm(across)?, up_mm: Some(mm(up)?) },
+        None => Lengths { across_mm: mm(text)?, up_mm: None },
+    })
 }
 
 fn scale(text: &str) -> Result<[f64; 2], String> {
     let parts: Vec<&str> = text.split(',').collect();
     let number = |part: &str| {
+        let value = |text: &str| text.trim().parse::<f64>().ok();
+        let ratio = match part.split_once('/') {
+            Some((measured, nominal)) => value(measured).zip(value(nominal)).map(|(m, n)| m / n),
+            None => value(part),
+        };
         // Beyond this range, the bars were misread.
-        print_scale::RANGE.parse(part).map_err(|_| {
-            format!("`{part}` is not a valid ratio of measured to nominal length (near 1)")
+        ratio.and_then(|ratio| print_scale::RANGE.check(ratio).ok()).ok_or_else(|| {
+            format!(
+                "`{part}` is not a valid ratio of measured to nominal length (near 1); for lengths use --measured"
+            )
         })
     };
     match parts.as_slice() {
@@ -277,13 +304,46 @@ impl SheetArgs {
             _ => Vec::new(),
         };
         let Some(path) = &self.shape else {
-            return Ok(Sheet { print_scale: self.print_scale, shape: None, sheets });
+            let measured = self.measured.map(|lengths| lengths.scale(&sheets)).transpose();
+            let print_scale = measured.context("--measured")?.or(self.print_scale);
+            return Ok(Sheet { print_scale, shape: None, sheets });
         };
         let show = || format!("--shape: {}", path.display());
         let text = limits.read_text(path).context("--shape")?;
         camera_file::warn_if_failed(path, &text);
         let sheet = sheet::read_sheet(&text, targets).with_context(show)?;
         Ok(Sheet { sheets, ..sheet })
+    }
+}
+
+impl Lengths {
+    /// Returns the ratios of these lengths to those of the check bars on the first page, across and up.
+    fn scale(self, sheets: &[SheetLayout]) -> anyhow::Result<[f64; 2]> {
+        let page =
+            sheets.first().map(|sheet| sheet.pages.first().map_or(sheet, |page| &page.marks));
+        let bars = page.map_or(&[][..], |page| &page.check_bars);
+        let ratio = |direction: &str, is_across: bool, measured_mm: f64| {
+            let is_it = |bar: &&CheckBar| {
+                let along = (bar.to_mm - bar.from_mm).abs();
+                (along.x > along.y) == is_across
+            };
+            let bar = bars.iter().find(is_it).with_context(|| {
+                format!(
+                    "the description has no sheet with a {direction} check bar; use --print-scale"
+                )
+            })?;
+            let nominal_mm = bar.length_mm();
+            print_scale::RANGE.check(measured_mm / nominal_mm).map_err(|_| {
+                anyhow!(
+                    "{} is not the length of the {direction} check bar, which is {} long",
+                    format_mm(measured_mm),
+                    format_mm(nominal_mm)
+                )
+            })
+        };
+        let across = ratio("horizontal", true, self.across_mm)?;
+        let up = self.up_mm.map(|mm| ratio("vertical", false, mm)).transpose()?;
+        Ok([across, up.unwrap_or(across)])
     }
 }
 

@@ -1,5 +1,6 @@
 //! Options and output that the calibration commands share.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -20,9 +21,11 @@ use deltille::calibrate::{
     PoseUncertainty, Source, TargetMap, Weights,
 };
 use deltille::camera::Camera;
+use deltille::detect::Detection;
 use deltille::export::calibration::{Print, Residuals};
 use deltille::export::camera::FormatError;
 use deltille::layout::Printing;
+use deltille::raster::CameraNotes;
 use deltille::report::target_map_svg;
 use deltille::targets::{self, parse_length_mm};
 use deltille_core::quantity::board_accuracy_mm;
@@ -210,6 +213,8 @@ pub struct Calibrated {
     pub print: Print,
     /// Candidate models, by camera.
     pub models: Vec<Vec<Candidate>>,
+    /// Metadata of the photographs, by camera.
+    pub notes: BTreeMap<usize, CameraNotes>,
 }
 
 impl SolveArgs {
@@ -282,7 +287,7 @@ impl SolveArgs {
             _ => tried,
         };
         let models = tried.into_iter().enumerate().map(compared).collect();
-        Ok(Calibrated { estimate, diagnoses, stated, print, models })
+        Ok(Calibrated { estimate, diagnoses, stated, print, models, notes: BTreeMap::new() })
     }
 
     /// Returns the path of the report (`<stem>-report.html` in a folder). Rejects unusable paths before the work
@@ -302,6 +307,13 @@ pub fn print_diagnoses(words: &Messages<'_>, diagnoses: &[Diagnosis]) {
 }
 
 impl Calibrated {
+    /// Adds the metadata of a camera's photographs that state its focal length.
+    pub fn add_notes(&mut self, camera: usize, detections: &[(String, Detection)]) {
+        let mut notes = detections.iter().filter_map(|(_, found)| found.file.camera.as_ref());
+        let notes = notes.find(|notes| notes.focal_mm.is_some() && notes.focal_35mm_mm.is_some());
+        self.notes.extend(notes.map(|notes| (camera, notes.clone())));
+    }
+
     /// Prints the diagnoses on standard error. Fails if the images were not taken by a fixed camera.
     pub fn print_diagnoses(&self) -> anyhow::Result<()> {
         let words = Messages::new(&self.estimate, self.print.scale);

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow};
 
-use crate::output::log;
+use crate::output::{detail, log};
 use deltille::calibrate::{CameraEstimate, Estimate};
 use deltille::camera::{Camera, CameraFile};
 use deltille::camera_file;
@@ -22,6 +22,8 @@ pub fn read(option: &str, path: &Path) -> anyhow::Result<Camera> {
 pub fn read_with_targets(option: &str, path: &Path) -> anyhow::Result<CameraFile> {
     let file = camera_file::read_with_targets(path).context(option.to_owned())?;
     warn_of(path, file.failed.as_deref());
+    let Camera { width, height, .. } = file.camera;
+    detail!("read {}: a camera of {width} × {height} px", path.display());
     Ok(file)
 }
 

@@ -4,17 +4,22 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 
-use crate::output::log;
+use crate::output::{detail, log};
 use deltille::detect::check_distinct;
 use deltille::family;
 use deltille::layout::Printing;
 use deltille::limits::Limits;
 use deltille::target_file::{self, TargetFamilyError};
 use deltille::targets::Target;
+use deltille_core::words::counted;
 
 /// Reads a target with its sheets: `.dsc` files by their extension, JSON otherwise.
 pub fn read(path: &Path, limits: &Limits) -> anyhow::Result<Printing> {
-    Ok(target_file::read(path, limits)?)
+    let printing = target_file::read(path, limits)?;
+    let corners: usize = printing.target.panels.iter().map(|panel| panel.corners.len()).sum();
+    let panels = counted(printing.target.panels.len(), "panel");
+    detail!("read {}: {panels}, {}", path.display(), counted(corners, "corner"));
+    Ok(printing)
 }
 
 /// Like [`read`], for commands that need poses; warns if a `.dsc` lacks the poses of its boards.

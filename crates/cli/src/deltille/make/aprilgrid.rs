@@ -48,7 +48,8 @@ pub struct Args {
 }
 
 /// Creates a grid, writes its files and Kalibr's target file, and verifies them.
-pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
+    args.printing.take_file(Some(&mut args.meshes.meshes))?;
     args.meshes.check_use(None)?;
     let is_made = args.meshes.is_any();
     let Grid(tags) = args.tags;

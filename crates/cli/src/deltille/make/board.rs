@@ -6,11 +6,11 @@ use std::process::ExitCode;
 use anyhow::{Context, bail};
 
 use super::delivery::Delivery;
-use super::settings::board_settings::{BoardSettings, Plan};
+use super::settings::board_settings::{BoardSettings, OUTPUT, Plan};
 use super::settings::finishing::{Finishing, Laser};
 use super::settings::meshes::PlateMeshes;
 use super::settings::template::Template;
-use super::single_panel::idle_without_pages;
+use super::single_panel::{idle_without_pages, page};
 use crate::deltille::files::written::{File, Formats, drawn, text_file};
 use crate::output::log;
 use deltille::export::dsc;
@@ -25,10 +25,10 @@ pub struct Args {
     #[command(flatten)]
     settings: BoardSettings,
     /// Read settings that are not given as options from a TOML file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = OUTPUT, value_name = "FILE")]
     template: Option<PathBuf>,
     /// Write the settings as a TOML file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = OUTPUT, value_name = "FILE")]
     save_template: Option<PathBuf>,
     #[command(flatten)]
     delivery: Delivery,
@@ -42,7 +42,9 @@ pub struct Args {
 
 /// Creates a board, writes its files, and verifies them.
 pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
-    let given = args.settings.with(args.meshes, args.laser, args.finishing);
+    let mut args = args;
+    let file = args.delivery.take_file(&BoardSettings::ENDINGS)?;
+    let given = args.settings.with(args.meshes, args.laser, args.finishing).for_file(file)?;
     let settings = match &args.template {
         Some(path) => given.or(BoardSettings::read(path, grid)?),
         None => given,
@@ -136,12 +138,5 @@ fn summary(printing: &Printing) -> String {
         let last = ids.next_back().unwrap_or(first);
         text += &format!(", {}", tag_range(&family.name, first, last));
     }
-    let Some(sheet) = printing.sheets.first() else { return text };
-    let page = sheet.pages.first().map_or(sheet, |page| &page.marks);
-    let [width, height] = [page.width_mm, page.height_mm].map(|mm| (mm * 1e3).round() / 1e3);
-    let pages = match sheet.page_count() {
-        1 => "page".to_owned(),
-        _ => format!("{} pages", printing.page_count()),
-    };
-    text + &format!(", {pages} {width} × {height} mm")
+    text + &page(printing)
 }

@@ -44,7 +44,8 @@ pub struct Args {
 }
 
 /// Creates a board, writes its files, and verifies them.
-pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
+    args.printing.take_file(Some(&mut args.meshes.meshes))?;
     args.meshes.check_use(None)?;
     let is_made = args.meshes.is_any();
     let Grid(squares) = args.squares;

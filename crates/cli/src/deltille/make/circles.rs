@@ -30,7 +30,8 @@ pub struct Args {
 }
 
 /// Creates a grid, writes its files, and verifies them.
-pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
+    args.printing.take_file(None)?;
     let Grid(circles) = args.circles;
     let usual = CirclesSpec::new(circles, args.spacing);
     let spec = CirclesSpec {

@@ -6,11 +6,12 @@ use std::process::ExitCode;
 use anyhow::Context;
 use serde::Serialize;
 
+use super::settings::board_settings::OUTPUT;
 use super::verify::{self, Proof};
 use crate::deltille::files::limits::FileLimits;
 use crate::deltille::files::target_file;
 use crate::deltille::files::written::{File, same_file, write_all};
-use crate::output::{self, Overwrite, ResultFormat, say};
+use crate::output::{self, NamedFile, Overwrite, Place, ResultFormat, report};
 use deltille::layout::Printing;
 use deltille::limits::Limits;
 use deltille::targets::Target;
@@ -34,11 +35,12 @@ struct Delivered<'a> {
 
 /// Options for the output files of a target, and for the checks before and after.
 #[derive(clap::Args)]
+#[command(next_help_heading = OUTPUT)]
 pub struct Delivery {
     /// Description of another target to be used together with this one; shared ids are rejected. Repeatable
     #[arg(long, value_name = "FILE")]
     with: Vec<PathBuf>,
-    /// Output folder
+    /// Output folder, or a file such as desk.pdf: its stem becomes the name, and its ending selects a format
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
     #[command(flatten)]
@@ -62,6 +64,13 @@ impl Delivery {
         Ok(())
     }
 
+    /// Returns the file that `-o` names, if its ending is one of these; only its folder remains the output.
+    pub fn take_file(&mut self, endings: &[&str]) -> anyhow::Result<Option<NamedFile>> {
+        let Place { folder, file } = output::place(&self.output, endings)?;
+        self.output = folder;
+        Ok(file)
+    }
+
     /// Whether an output file of this name would replace another file.
     pub fn would_replace(&self, name: &str, other: &Path) -> bool {
         same_file(&self.output.join(name), other)
@@ -83,10 +92,10 @@ impl Delivery {
         let written = write_all(&self.output, files, self.overwrite)?;
         if !self.result_format.is_json() {
             for line in summary.lines() {
-                say!("{line}");
+                report!("{line}");
             }
             for path in &written {
-                say!("wrote {}", path.display());
+                report!("wrote {}", path.display());
             }
         }
         // A simulator model is verified together with the OBJ that it uses.

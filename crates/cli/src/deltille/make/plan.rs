@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Context, bail, ensure};
 
 use crate::deltille::files::camera_file;
-use crate::output::{self, ResultFormat, say};
+use crate::output::{self, ResultFormat, log, say};
 use crate::values::{distance, number};
 use deltille::family::{self, positions};
 use deltille::lattice::GridKind;
@@ -32,7 +32,7 @@ pub struct Args {
     camera: Option<PathBuf>,
     /// Range of distances from the camera to the board, such as 50cm..3m
     #[arg(long, value_name = "NEAR..FAR", value_parser = range)]
-    distance: [f64; 2],
+    distance: Distances,
     /// Maximum tilt at which all tags must be readable at the farthest distance, °
     #[arg(long, value_name = "DEGREES", default_value = "45", value_parser = number(0.0..=75.0))]
     tilt: f64,
@@ -65,8 +65,15 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     sides.ok_or_else(|| "expected width and height in px, such as 1920x1080".to_owned())
 }
 
+/// Range of distances.
+#[derive(Clone, Copy)]
+struct Distances {
+    mm: [f64; 2],
+    has_unit: bool,
+}
+
 /// Parses two distances, mm; the unit may be given only once, at the end.
-fn range(text: &str) -> Result<[f64; 2], String> {
+fn range(text: &str) -> Result<Distances, String> {
     let (near, far) = text
         .split_once("..")
         .ok_or_else(|| "expected two distances, such as 50cm..3m".to_owned())?;
@@ -75,9 +82,14 @@ fn range(text: &str) -> Result<[f64; 2], String> {
         Ok(_) => format!("{near}{unit}"),
         Err(_) => near.to_owned(),
     };
-    let [near, far] = [distance(&with_unit)?, distance(far)?];
-    if near < far {
-        Ok([near, far])
+    let has_unit = !unit.is_empty();
+    let parsed = distance(&with_unit).and_then(|near| Ok([near, distance(far)?]));
+    let mm = parsed.map_err(|why| match has_unit {
+        true => why,
+        false => format!("{why}; a number without a unit is in mm, so add one, such as {text}m"),
+    })?;
+    if mm[0] < mm[1] {
+        Ok(Distances { mm, has_unit })
     } else {
         Err("the first distance must be the shorter one".to_owned())
     }
@@ -101,10 +113,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
         (None, None) => bail!("--size (the image size) or --camera is needed"),
     };
+    if !args.distance.has_unit {
+        log!("note: --distance has no unit and was read as mm");
+    }
     let situation = Situation {
         focal_px,
         size_px,
-        distances_mm: args.distance,
+        distances_mm: args.distance.mm,
         tilt_rad: args.tilt.to_radians(),
     };
     let (kind, command) = match args.checker {

@@ -5,11 +5,13 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 
 use super::delivery::Delivery;
-use super::settings::board_settings::{DEFAULT_DPI, DPI, PAPER, PRINT};
+use super::settings::board_settings::{DEFAULT_DPI, DPI, OUTPUT, PAPER, PRINT};
 use super::settings::finishing::{Finishing, Laser};
 use super::settings::logo;
+use super::settings::meshes::Meshes;
 use super::settings::option_checks::refuse_idle;
 use crate::deltille::files::written::{File, Formats, drawn, text_file};
+use crate::output::named_by;
 use crate::values::{name, whole};
 use deltille::family::Family;
 use deltille::layout::{self, DEFAULT_MARGIN_MM, PaperSize, PaperSpec};
@@ -45,16 +47,16 @@ pub struct PrintingArgs {
     #[arg(long, help_heading = PRINT, value_parser = whole(DPI))]
     dpi: Option<u32>,
     /// Text for the label of every sheet, next to the name, such as the owner
-    #[arg(long, value_name = "TEXT")]
+    #[arg(long, help_heading = PAPER, value_name = "TEXT")]
     note: Option<String>,
     /// SVG logo, printed in black opposite the label: filled paths and strokes; white areas stay unprinted
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = PAPER, value_name = "FILE")]
     logo: Option<PathBuf>,
     /// Height of the logo [default: the height of the label strip]
-    #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm)]
+    #[arg(long, help_heading = PAPER, value_name = "LENGTH", value_parser = parse_length_mm)]
     logo_height: Option<f64>,
     /// Stem of the file names, also printed on the sheet [default: the name of the command]
-    #[arg(long, value_parser = name)]
+    #[arg(long, help_heading = OUTPUT, value_parser = name)]
     name: Option<String>,
     #[command(flatten)]
     pub delivery: Delivery,
@@ -65,6 +67,22 @@ pub struct PrintingArgs {
 }
 
 impl PrintingArgs {
+    /// Sets the folder, the name and the format of the file that `-o` names, which may be one of the meshes.
+    pub fn take_file(&mut self, meshes: Option<&mut Meshes>) -> anyhow::Result<()> {
+        let of_meshes = if meshes.is_some() { Meshes::ENDINGS.as_slice() } else { &[] };
+        let file =
+            self.delivery.take_file(&[&["json", "pdf", "svg", "png"], of_meshes].concat())?;
+        let (name, ending) = named_by(self.name.take(), file)?;
+        self.name = name;
+        match ending.as_str() {
+            "pdf" => self.pdf = true,
+            "svg" => self.svg = true,
+            "png" => self.png = true,
+            of_mesh => meshes.into_iter().for_each(|meshes| meshes.request(of_mesh)),
+        }
+        Ok(())
+    }
+
     /// Whether a PDF is written: also if no other format is requested and no mesh `is_made`.
     fn is_pdf(&self, is_made: bool) -> bool {
         self.pdf || !(self.svg || self.png || self.laser.is_any() || is_made)
@@ -129,11 +147,8 @@ pub fn idle_without_pages(paper: &PaperSpec) -> anyhow::Result<()> {
     ])
 }
 
-/// Describes the paper of a target.
+/// Describes the paper of a target, to be appended to other words.
 pub fn page(printing: &layout::Printing) -> String {
-    let sheet = printing.sheets.first();
-    sheet.map_or_else(String::new, |sheet| {
-        let [width, height] = [sheet.width_mm, sheet.height_mm].map(|mm| (mm * 1e3).round() / 1e3);
-        format!(", page {width} × {height} mm")
-    })
+    let pages = printing.pages_in_words();
+    if pages.is_empty() { pages } else { format!(", {pages}") }
 }

@@ -7,11 +7,12 @@ use std::process::ExitCode;
 use anyhow::{Context, bail};
 
 use super::delivery::Delivery;
-use super::settings::board_settings::{DEFAULT_DPI, TAGS};
+use super::settings::board_settings::{DEFAULT_DPI, OUTPUT, TAGS};
 use super::settings::finishing::Laser;
 use super::settings::meshes::Meshes;
 use super::settings::solid_settings::SolidSettings;
 use super::settings::template::Template;
+use super::single_panel::page;
 use crate::deltille::files::written::{self, File, bytes_file, text_file};
 use crate::output::say;
 use crate::values::{number, whole};
@@ -20,8 +21,7 @@ use deltille::export::{dsc, solid_mesh};
 use deltille::family::{self, Family};
 use deltille::layout::{Printing, tag_range};
 use deltille::targets::{
-    ClosedMesh, NEAR_EQUILATERAL, Name, Skeleton, SolidShape, SolidSpec, Target, TargetSpec,
-    parse_box_mm,
+    ClosedMesh, NEAR_EQUILATERAL, Name, Skeleton, SolidShape, SolidSpec, TargetSpec, parse_box_mm,
 };
 use deltille_core::quantity::unit_mm;
 
@@ -31,10 +31,10 @@ pub struct Args {
     #[command(flatten)]
     settings: SolidSettings,
     /// Read settings that are not given as options from a TOML file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = OUTPUT, value_name = "FILE")]
     template: Option<PathBuf>,
     /// Write the settings as a TOML file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = OUTPUT, value_name = "FILE")]
     save_template: Option<PathBuf>,
     #[command(flatten)]
     delivery: Delivery,
@@ -98,7 +98,7 @@ pub struct MeshArgs {
 const SCALE: RangeInclusive<f64> = unit_mm::RANGE.least..=unit_mm::RANGE.most;
 
 /// Makes a solid with the shape of its command.
-pub fn run(shape: SolidShape, args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(shape: SolidShape, mut args: Args) -> anyhow::Result<ExitCode> {
     let command = shape.name();
     let settings = args.settings(command)?;
     run_with(shape, command, settings, &args)
@@ -168,12 +168,13 @@ fn run_with(
     settings: SolidSettings,
     args: &Args,
 ) -> anyhow::Result<ExitCode> {
+    let settings = settings.with_default_files();
     settings.check_use()?;
-    let meshes = meshes_of(&settings);
+    let meshes = &settings.meshes;
     meshes.check_use(None)?;
     settings.laser.check_use()?;
-    let spec = settings.spec(shape)?;
     let paper = settings.paper()?;
+    let spec = settings.spec(shape, &paper)?;
     let family = family_of(&spec)?;
     let name = settings.name.clone().unwrap_or_else(|| spec.shape.name().to_owned());
     // The net to cut is the printed one; the description contains it even if it is not printed.
@@ -193,7 +194,7 @@ fn run_with(
     files.extend(textured);
     files.extend(settings.laser.files(&printing)?);
     files.extend(pages(&settings, &printing)?);
-    let description = summary(target, &spec)? + &texture;
+    let description = summary(&printing, &spec)? + &texture;
     let delivered = args.delivery.deliver(&printing, &files, &description)?;
     template.map_or(Ok(()), |template| template.write())?;
     Ok(delivered)
@@ -210,9 +211,10 @@ fn family_of(spec: &SolidSpec) -> anyhow::Result<Option<Family>> {
 
 impl Args {
     /// Returns the given settings, completed by the template.
-    fn settings(&self, command: &str) -> anyhow::Result<SolidSettings> {
+    fn settings(&mut self, command: &str) -> anyhow::Result<SolidSettings> {
         let (meshes, laser) = (self.meshes.clone(), self.laser.clone());
         let given = SolidSettings { meshes, laser, ..self.settings.clone() };
+        let given = given.for_file(self.delivery.take_file(&SolidSettings::ENDINGS)?)?;
         let settings = match &self.template {
             Some(path) => given.or(SolidSettings::read(path, command)?),
             None => given,
@@ -220,15 +222,6 @@ impl Args {
         settings.check_shape(command)?;
         Ok(settings)
     }
-}
-
-/// Returns the requested meshes, or the glTF if nothing is requested.
-fn meshes_of(settings: &SolidSettings) -> Meshes {
-    let SolidSettings { stl, skeleton, dxf, .. } = *settings;
-    let bodies = stl || skeleton || dxf || settings.laser.is_any();
-    let meshes = settings.meshes.clone();
-    let nothing = !(bodies || settings.printed() || meshes.is_any());
-    if nothing { meshes.with_gltf() } else { meshes }
 }
 
 /// Returns the description, bodies, outlines and lists. Rejects invalid ones before anything is written.
@@ -269,7 +262,8 @@ fn pages(settings: &SolidSettings, printing: &Printing) -> anyhow::Result<Vec<Fi
 }
 
 /// Describes the solid in one line, and the panels of a skeleton in another.
-fn summary(target: &Target, spec: &SolidSpec) -> anyhow::Result<String> {
+fn summary(printing: &Printing, spec: &SolidSpec) -> anyhow::Result<String> {
+    let target = &printing.target;
     let corners: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
     let size = match &spec.shape {
         SolidShape::Cuboid(_) => spec.size(),
@@ -291,6 +285,7 @@ fn summary(target: &Target, spec: &SolidSpec) -> anyhow::Result<String> {
             text += &format!(", {}", tag_range(&family.of_tiling(kind).name, first, last));
         }
     }
+    text += &page(printing);
     if let Some(skeleton) = &spec.skeleton {
         let solid = spec.polyhedron();
         let made = Skeleton::new(&solid, skeleton)?;

@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Duration;
 
 use anyhow::{Context, bail};
 use serde::Serialize;
@@ -11,13 +10,14 @@ use serde::Serialize;
 use crate::deltille::files::limits::AllLimits;
 use crate::deltille::files::target_file;
 use crate::deltille::files::written::same_file;
-use crate::output::{self, Overwrite, ResultFormat, log, say};
+use crate::output::{self, Overwrite, ResultFormat, log, report, say};
 use crate::run::{self, FAILED};
 use crate::{interrupt, progress};
 use deltille::export::kind::Kind;
 use deltille::export::{laser_file_name, sheet_file_name, stl, threemf};
 use deltille::layout::Printing;
 use deltille::limits::Limits;
+use deltille::target_file::find;
 use deltille::targets::Target;
 use deltille::verify::{Progress, Verdict, Verifier};
 use deltille_core::words::{counted, shown};
@@ -25,7 +25,7 @@ use deltille_core::words::{counted, shown};
 /// Arguments of `deltille verify`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Target description, as written by `deltille board`
+    /// Target description, as written by `deltille board`, or the folder that contains it
     target: PathBuf,
     /// Files to verify [default: all files of the target in the same folder]
     artifacts: Vec<PathBuf>,
@@ -46,16 +46,17 @@ pub struct Args {
 /// Verifies files against their target description.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
-    let mut printing = target_file::read(&args.target, &limits)?;
+    let description = find(&args.target)?;
+    let mut printing = target_file::read(&description, &limits)?;
     target_file::set_family(&mut printing.target, args.family.as_deref())?;
     let printing = printing.under_printed_name();
-    let folder = args.target.parent().unwrap_or(Path::new("."));
+    let folder = description.parent().unwrap_or(Path::new("."));
     let alone = args.artifacts.len() == 1;
     let artifacts = match args.artifacts.as_slice() {
         [] => {
             let mut beside = artifacts_beside(folder, &printing);
             // A description cannot verify itself.
-            beside.retain(|path| !same_file(path, &args.target));
+            beside.retain(|path| !same_file(path, &description));
             beside
         }
         given => given.to_vec(),
@@ -84,9 +85,6 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(proof.code())
 }
 
-/// Update interval of the elapsed time.
-const TICK: Duration = Duration::from_millis(200);
-
 /// Verifies files, and prints a line for each unless the output is JSON. All pages of a target are among them, unless
 /// one is verified `alone`.
 pub fn prove(
@@ -114,7 +112,6 @@ pub fn prove(
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         bar.set_message(shown(&name).into_owned());
         bar.reset();
-        bar.enable_steady_tick(TICK);
         let verdict = verifier.verify_path(path);
         bar.finish_and_clear();
         match verdict {
@@ -231,8 +228,10 @@ impl Proof {
     }
 
     fn add(&mut self, verdict: Verdict, result_format: ResultFormat) -> anyhow::Result<()> {
-        if !result_format.is_json() {
-            say!("{verdict}");
+        match (result_format.is_json(), verdict.passed) {
+            (true, _) => {}
+            (false, true) => report!("{verdict}"),
+            (false, false) => say!("{verdict}"),
         }
         self.passed &= verdict.passed;
         self.artifacts.push(verdict);
@@ -245,7 +244,7 @@ impl Proof {
         let files = counted(artifacts.len(), "file");
         match artifacts.iter().filter(|verdict| !verdict.passed).count() {
             _ if !self.errors.is_empty() => {}
-            0 => say!("verified: {files} of target {target}"),
+            0 => report!("verified: {files} of target {target}"),
             1 => say!("FAILED: 1 of {files} differs from target {target}"),
             failed => say!("FAILED: {failed} of {files} differ from target {target}"),
         }

@@ -10,7 +10,7 @@ use clap::Subcommand;
 use crate::deltille::files::images::Images;
 use crate::deltille::files::target_file;
 use crate::deltille::files::written::{bytes_file, text_file, write_all};
-use crate::output::{Overwrite, say};
+use crate::output::{Overwrite, report, say};
 use crate::run::Interrupted;
 use crate::values::whole;
 use crate::{interrupt, output, progress};
@@ -291,7 +291,7 @@ fn run_corners(args: CornersArgs) -> anyhow::Result<ExitCode> {
         bytes_file("corners.png".to_owned(), png),
     ];
     for path in write_all(folder, &files, simulation.overwrite)? {
-        say!("wrote {}", path.display());
+        report!("wrote {}", path.display());
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -334,7 +334,7 @@ fn run_photographs(args: PhotographsArgs) -> anyhow::Result<ExitCode> {
         text_file("photographs.svg".to_owned(), svg),
     ];
     for path in write_all(&simulation.output, &files, simulation.overwrite)? {
-        say!("wrote {}", path.display());
+        report!("wrote {}", path.display());
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -5,17 +5,18 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Mutex;
+use std::time::Instant;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 
 use super::detector_options::FinderArgs;
 use crate::deltille::files::detection_tables::{self, Tables};
 use crate::deltille::files::images::{Images, RecordingArgs, Stems};
 use crate::deltille::files::images_at_once;
-use crate::output::{self, Overwrite, log};
+use crate::output::{self, NamedFile, Overwrite, Place, detail, log};
 use crate::run::{self, BAD_INPUT, FAILED, Interrupted};
 use crate::values::{format, whole};
-use crate::{interrupt, progress};
+use crate::{interrupt, progress, terminal};
 use deltille::clock;
 use deltille::detect::{Detection, Detector, InkEstimate, Tracker};
 use deltille::export::kind::Kind;
@@ -40,11 +41,15 @@ pub struct Args {
     recording: RecordingArgs,
     #[command(flatten)]
     finder: FinderArgs,
-    /// Output folder; result files are named after the images [default: current folder]
+    /// Output folder, whose files are named after the images; or a file such as corners.csv for one image [default: current
+    /// folder]
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
-    /// Output formats, separated by commas
-    #[arg(long, value_delimiter = ',', default_value = "json", value_parser = format(DETECTION_FORMATS))]
+    /// Stem of the output files of one image.
+    #[arg(skip)]
+    stem: Option<String>,
+    /// Output formats, separated by commas [default: that of the file given by -o, or json]
+    #[arg(long, value_delimiter = ',', value_parser = format(DETECTION_FORMATS))]
     format: Vec<&'static DetectionFormat>,
     /// Also write <image>.overlay.jpg: corners, grid and ids drawn over the photograph
     #[arg(long)]
@@ -122,7 +127,10 @@ struct Seen {
 }
 
 /// Detects targets in all images. Images that cannot be read are reported, and the others are processed.
-pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
+    let images = Images::of(&args.images)?;
+    args.set_place(&images)?;
+    let args = args;
     let (targets, detector) = args.finder.detector()?;
     let of_one = args.format.iter().find(|format| format.is_of_one_target);
     if let Some(format) = of_one.filter(|_| targets.len() > 1) {
@@ -131,7 +139,6 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let detector = if args.timing { detector.with_clock(clock::now) } else { detector };
     let finder = ImageDetector::of(&args, detector);
-    let images = Images::of(&args.images)?;
     // Detects name clashes among the named images before the work starts.
     let mut named = Stems::default();
     for image in images.named().iter().filter(|path| !is_recording(path)) {
@@ -139,7 +146,6 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let new_folder = args.folder().filter(|folder| !folder.exists());
     if let Some(folder) = args.folder() {
-        output::check_folder(folder).context("-o")?;
         fs::create_dir_all(folder)
             .with_context(|| format!("-o: cannot write to {}", folder.display()))?;
         output::settle(folder).context("-o")?;
@@ -181,7 +187,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Ok(frame)
     });
     let go_on = if args.stream { "" } else { "; resume with --skip-existing" };
-    let report = Report::new(images.is_single(), go_on);
+    let report = Report::new(images.is_single(), terminal::is_quiet() && !args.stream, go_on);
     let seen: Mutex<Vec<Seen>> = Mutex::default();
     // Rows of images that were not processed, if they have one.
     let unseen: Mutex<Vec<(usize, Option<ImageRecord>)>> = Mutex::default();
@@ -318,6 +324,8 @@ fn row_of(name: Option<String>, result: &mut anyhow::Result<Outcome>) -> Option<
 
 /// Prints the results of the images in order, as soon as they are available.
 struct Report {
+    /// Whether images are not reported.
+    is_silent: bool,
     /// With a single image, its error is the error of the command.
     single: bool,
     /// How to resume after an interruption.
@@ -336,15 +344,15 @@ struct State {
 }
 
 impl Report {
-    fn new(single: bool, go_on: &'static str) -> Self {
-        let report = Self { single, go_on, state: Mutex::default() };
+    fn new(single: bool, is_silent: bool, go_on: &'static str) -> Self {
+        let report = Self { single, is_silent, go_on, state: Mutex::default() };
         interrupt::set_status(report.status());
         report
     }
 
     /// Describes the progress so far.
     fn status(&self) -> String {
-        format!("{} images done{}", self.done(), self.go_on)
+        format!("{} done{}", counted(self.done(), "image"), self.go_on)
     }
 
     fn add(&self, index: usize, result: anyhow::Result<Outcome>) {
@@ -364,6 +372,9 @@ impl Report {
                 Ok(Outcome::Seen(found)) => {
                     state.found += usize::from(found.is_there);
                     // Output that cannot be printed is lost, as with `println`.
+                    if self.is_silent {
+                        continue;
+                    }
                     if let Err(error) = output::print(&found.line) {
                         state.error.get_or_insert(error);
                     }
@@ -398,7 +409,10 @@ impl Report {
             return Err(error);
         }
         if skipped > 0 {
-            log!("{skipped} of {all} images skipped, because they already have results");
+            log!(
+                "{skipped} of {} skipped, because they already have results",
+                counted(all, "image")
+            );
         }
         if failed == 0 {
             let nothing = found == 0 && skipped == 0;
@@ -412,6 +426,44 @@ impl Report {
 }
 
 impl Args {
+    /// Separates the folder and the file that `-o` names, and sets the format.
+    fn set_place(&mut self, images: &Images) -> anyhow::Result<()> {
+        if let Some(output) = &self.output {
+            let endings: Vec<&str> = DETECTION_FORMATS.iter().map(|format| format.name()).collect();
+            let Place { folder, file } = output::place(output, &endings)?;
+            if let Some(NamedFile { stem, ending }) = file {
+                let is_photograph = images.is_single() && images.count().is_some();
+                let named = DETECTION_FORMATS.iter().find(|format| format.name() == ending);
+                let named = named.filter(|format| format.is_of_one_image() && is_photograph);
+                let named = named.with_context(|| {
+                    format!(
+                        "-o: {} must be a folder, because several files are written",
+                        output.display()
+                    )
+                })?;
+                self.stem = Some(stem);
+                if self.format.is_empty() {
+                    self.format.push(named);
+                }
+                ensure!(
+                    self.format.iter().any(|format| format.name() == ending),
+                    "--format does not contain {ending}, the format of -o"
+                );
+            }
+            self.output = Some(folder);
+        }
+        if self.format.is_empty() {
+            self.format.extend(DETECTION_FORMATS.first());
+        }
+        Ok(())
+    }
+
+    /// Returns the path of a result file of an image, if files are written.
+    fn path(&self, stem: &str, ending: &str) -> Option<PathBuf> {
+        let stem = self.stem.as_deref().unwrap_or(stem);
+        Some(self.folder()?.join(format!("{stem}.{ending}")))
+    }
+
     /// Returns the output folder; `None` with `--stream` alone.
     fn folder(&self) -> Option<&Path> {
         match &self.output {
@@ -433,11 +485,10 @@ impl Args {
 
     /// Returns the result files of an image.
     fn results(&self, stem: &str) -> Vec<(PathBuf, Kind)> {
-        let Some(folder) = self.folder() else { return Vec::new() };
         let formats = self.each().map(|format| (format.name(), format.kind()));
         let overlay = self.overlay.then(|| ("overlay.jpg", Kind::own_jpeg()));
         let all = formats.chain(overlay);
-        all.map(|(end, kind)| (folder.join(format!("{stem}.{end}")), kind)).collect()
+        all.filter_map(|(end, kind)| Some((self.path(stem, end)?, kind))).collect()
     }
 
     /// Refuses to replace a target, the ground truth of a synthetic image, or any other file.
@@ -458,20 +509,19 @@ fn one_image(
     let (place, stem) = (frame.path().to_owned(), frame.stem());
     let (name, time_ns) = (frame.name(), frame.time_ns());
     let Photograph { image, notes } = frame.read(&limits, args.accept_damaged)?;
+    let start = Instant::now();
     let mut found = finder.detect(&image, &name);
+    detail!("{}: detected in {:.1} ms", place.display(), 1e3 * start.elapsed().as_secs_f64());
     (found.file, found.time_ns) = (notes, time_ns);
-    if let Some(folder) = args.folder() {
-        let path = |extension: &str| folder.join(format!("{stem}.{extension}"));
-        let text = |format: &&DetectionFormat| {
-            let text = format.text(&found, targets.first())?;
-            Some((path(format.name()), text.into_bytes()))
-        };
-        let mut files: Vec<(PathBuf, Vec<u8>)> = args.format.iter().filter_map(text).collect();
-        if args.overlay {
-            files.push((path("overlay.jpg"), overlay::jpeg(&image, &found)?));
-        }
-        atomic::write_together(&files)?;
+    let text = |format: &&DetectionFormat| {
+        let text = format.text(&found, targets.first())?;
+        Some((args.path(&stem, format.name())?, text.into_bytes()))
+    };
+    let mut files: Vec<(PathBuf, Vec<u8>)> = args.format.iter().filter_map(text).collect();
+    if let Some(path) = args.path(&stem, "overlay.jpg").filter(|_| args.overlay) {
+        files.push((path, overlay::jpeg(&image, &found)?));
     }
+    atomic::write_together(&files)?;
     let line = if args.stream { detection::write_line(&found) } else { summary(&place, &found) };
     let is_there = match targets.is_empty() {
         false => found.grids.iter().any(|grid| grid.panel.is_some()),

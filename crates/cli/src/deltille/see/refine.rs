@@ -8,6 +8,7 @@ use anyhow::{Context, anyhow, bail, ensure};
 use clap::ValueEnum;
 use glam::DVec2;
 
+use crate::deltille::files::images;
 use crate::deltille::files::limits::ImageLimits;
 use crate::output::{self, Overwrite};
 use deltille::detect::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner, Tone};
@@ -42,8 +43,8 @@ pub struct Args {
     /// Tone curve of the camera: linear, srgb, a gamma such as 2.2, or auto (estimated from all these corners)
     #[arg(long, value_name = "CURVE", default_value = "auto")]
     tone: Tone,
-    /// Output file [default: standard output]
-    #[arg(short, long, value_name = "FILE")]
+    /// Output file (.csv), or a folder [default: standard output]
+    #[arg(short, long, value_name = "FILE.csv")]
     output: Option<PathBuf>,
     #[command(flatten)]
     limits: ImageLimits,
@@ -105,7 +106,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let table = table(&refined);
     match &args.output {
-        Some(path) => output::write(path, table.as_bytes(), args.overwrite)?,
+        Some(path) => {
+            let stem = format!("{}-refined", images::stem(&args.image)?);
+            output::write(&output::file(path, &stem, "csv")?, table.as_bytes(), args.overwrite)?;
+        }
         None => output::print(&table)?,
     }
     Ok(ExitCode::SUCCESS)

@@ -17,6 +17,7 @@ use deltille::export::kind::signed_png;
 use deltille::export::truth;
 use deltille::synth::{Light, scene_of_target};
 use deltille_core::quantity::{Range, blur_px, light_gradient, of_full_scale, position_mm};
+use deltille_core::words::counted;
 
 /// Arguments of `deltille render`.
 #[derive(clap::Args)]
@@ -115,7 +116,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let files =
         [text_file(truth_name, truth), bytes_file(name.into_owned(), signed_png(png.into_inner()))];
     write_all(output::folder_of(&path), &files, args.overwrite)?;
-    say!("{}: {} corners in view", path.display(), seen.len());
+    say!("{}: {} in view", path.display(), counted(seen.len(), "corner"));
     if seen.is_empty() {
         // In the frames of OpenCV's boards, z points into the board.
         let first = target.panels.first();

@@ -16,10 +16,11 @@ use rstar::primitives::GeomWithData;
 use rstar::{AABB, RTree};
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
+use super::mesh::smallest_cell_mm;
 pub use super::meshing::{INLAY_MM, MIN_INLAY_MM};
 use super::meshing::{MeshError, Meshing};
 use deltille_core::polygon::rectangle;
-use deltille_core::targets::{Panel, Polyhedron, Target, TargetSpec};
+use deltille_core::targets::{Panel, Polyhedron, Target, TargetError, TargetSpec};
 use deltille_layout::artwork::{Part, Shape, panel_shapes, subject};
 
 /// Distance below which two points are the same corner computed in two ways, mm.
@@ -56,6 +57,8 @@ pub struct InlaidBodies {
     pub white: Body,
     /// The dark parts of the drawing, flush with the surface.
     pub black: Body,
+    /// Edge of the smallest cell of a tag, mm; `None` without tags.
+    pub cell_mm: Option<f64>,
 }
 
 impl InlaidBodies {
@@ -83,7 +86,16 @@ impl InlaidBodies {
             (TargetSpec::Solid(spec), _) => solid(target, &spec.polyhedron(), meshing.inlay_mm)?,
             _ => return Err(MeshError::NoShape(name)),
         };
-        Ok(Self { name, subject: subject(target), white, black })
+        let family = target.family().map_err(TargetError::from)?;
+        let cell_mm = family.map(|family| smallest_cell_mm(target, Some(family)));
+        Ok(Self { name, subject: subject(target), white, black, cell_mm })
+    }
+
+    /// Returns the extent along x, y and z in the target frame, mm.
+    pub fn size_mm(&self) -> DVec3 {
+        let vertices = || self.white.vertices_mm.iter().copied();
+        let least = vertices().reduce(DVec3::min).unwrap_or_default();
+        vertices().reduce(DVec3::max).unwrap_or_default() - least
     }
 }
 

@@ -172,7 +172,7 @@ impl TexturedMesh {
 }
 
 /// Edge of the smallest cell of a tag, mm, or of the equivalent part of a tile without a tag.
-fn smallest_cell_mm(target: &Target, family: Option<&Family>) -> f64 {
+pub(super) fn smallest_cell_mm(target: &Target, family: Option<&Family>) -> f64 {
     let of_panel = |panel: &Panel| family.and_then(|family| family.of_tiling(panel.kind));
     let cells = |panel: &Panel| match (of_panel(panel), panel.border_bits) {
         (Some(family), Some(_)) => family.cells().width(panel.tag_inset_bits()),

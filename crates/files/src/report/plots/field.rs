@@ -25,6 +25,12 @@ pub(super) const COLOURS: [&str; 11] = [
     "#234da0", "#1e2f88", "#081d58",
 ];
 
+/// The colours of observed uncertainties, so that their maps are not taken for those from noise.
+const OBSERVED: [&str; 11] = [
+    "#fcfbfd", "#f1eff6", "#e2e2ef", "#cecee5", "#b6b6d8", "#9e9ac8", "#8683bd", "#705eaa",
+    "#5c3696", "#4a1486", "#2f0461",
+];
+
 /// Length that nearly all arrows stay below, as a fraction of the distance between them.
 const ARROW_PART: f64 = 0.9;
 const NEARLY_ALL: f64 = 0.95;
@@ -51,6 +57,7 @@ struct Field {
     outlined: Vec<bool>,
     /// Meaning of the outline, shown in the legend.
     outline: &'static str,
+    colours: &'static [&'static str; 11],
     arrows: Vec<(DVec2, DVec2)>,
 }
 
@@ -78,6 +85,7 @@ pub fn comparison_svg(size_px: [u32; 2], found: &Comparison) -> String {
         values: values.collect(),
         outlined: outlined.collect(),
         outline: "outlined: compared region",
+        colours: &COLOURS,
         arrows: arrows
             .filter_map(|(_, place)| place.map(|place| (place.pixel, place.by)))
             .collect(),
@@ -111,21 +119,29 @@ fn of_uncertainty(camera: &CameraEstimate, map: &UncertaintyMap) -> Field {
         values: map.sd_px.clone(),
         outlined: places.map(is_seen).collect(),
         outline: "outlined: region with corners",
+        colours: match map.source {
+            Source::Noise => &COLOURS,
+            Source::Observed => &OBSERVED,
+        },
         arrows: Vec::new(),
     }
 }
 
 /// The caption of an uncertainty map.
 pub(in crate::report) fn caption(map: &UncertaintyMap) -> String {
-    let source = match map.source {
-        Source::Noise => "from corner noise alone",
-        Source::Observed => "observed: from the scatter between views",
+    let (head, source) = match map.source {
+        Source::Noise => ("Predicted", "from the noise of corners alone"),
+        Source::Observed => {
+            ("Observed", "from the scatter between views and the accuracy of the board")
+        }
     };
     let distance = match map.distance_mm {
         Some(mm) => format!("of points {mm:.0} mm away"),
         None => "of points at infinity".to_owned(),
     };
-    format!("Standard deviation of projections {distance} in the worst direction, {source}.")
+    format!(
+        "<b>{head}.</b> Standard deviation of projections {distance} in the worst direction, {source}."
+    )
 }
 
 const NAMES: [&str; 2] = ["x, px", "y, px"];
@@ -143,7 +159,7 @@ impl Field {
             let [low, high] = self.sides(index);
             match value {
                 Some(value) => {
-                    let fill = format!("fill=\"{0}\" stroke=\"{0}\"", COLOURS[level(*value)]);
+                    let fill = format!("fill=\"{0}\" stroke=\"{0}\"", self.colours[level(*value)]);
                     axes.bar(low, high, "value", &fill);
                 }
                 None => axes.bar(low, high, "none", ""),
@@ -160,7 +176,7 @@ impl Field {
             true => self.outline.to_owned(),
             false => format!("arrows enlarged {enlarged} times; {}", self.outline),
         };
-        let foot = levels(&self.values, axes.foot_width());
+        let foot = levels(&self.values, self.colours, axes.foot_width());
         axes.foot(SCALES, format!("{foot}<text x=\"0\" y=\"50\">{said}</text>"));
         axes
     }
@@ -213,7 +229,7 @@ fn level(value: f64) -> usize {
 }
 
 /// The legend of the colours that occur, drawn over `width`.
-fn levels(values: &[Option<f64>], width: f64) -> String {
+fn levels(values: &[Option<f64>], colours: &[&str; 11], width: f64) -> String {
     let found = values.iter().flatten().map(|&value| level(value));
     let (first, last) = found.fold((usize::MAX, 0), |(low, high), at| (low.min(at), high.max(at)));
     let mut drawn = String::new();
@@ -225,7 +241,7 @@ fn levels(values: &[Option<f64>], width: f64) -> String {
             drawn,
             "<rect x=\"{x:.1}\" y=\"8\" width=\"{width:.1}\" height=\"10\" fill=\"{}\" stroke=\"#888\" \
              stroke-width=\".4\"/>",
-            COLOURS[at]
+            colours[at]
         );
         if let Some(limit) = LEVELS.get(at).filter(|_| place + 1 < shown.len()) {
             let x = x + width;

@@ -15,7 +15,7 @@ use crate::placing::poster::{MAX_PAGES, Poster};
 use deltille_core::lattice::Vertex;
 use deltille_core::polygon;
 use deltille_core::setting::Setting::{
-    PaperSize, SolidEdgeMm, SolidMarginMm, SolidSheetsPerFace, SolidSheetsSeamedNet,
+    PaperPages, PaperSize, SolidEdgeMm, SolidMarginMm, SolidSheetsPerFace, SolidSheetsSeamedNet,
 };
 use deltille_core::targets::format_mm;
 use deltille_core::targets::{FamilyRef, Panel, SolidSpec, TargetError};
@@ -50,6 +50,17 @@ pub(crate) fn sheets(
             format_mm(spec.margin_mm)
         );
         return Err(TargetError::invalid(SolidMarginMm, problem));
+    }
+    if let (Some(most), None) = (paper.pages.filter(|pages| *pages > 1), &paper.size) {
+        for size in paper.sizes() {
+            let paper = PaperSpec { size: Some(size), ..paper.clone() };
+            let sheets = sheets(name, spec, panels, family, &paper);
+            if let Ok(sheets) = sheets
+                && sheets.iter().map(SheetLayout::page_count).sum::<usize>() <= most as usize
+            {
+                return Ok(sheets);
+            }
+        }
     }
     let (solid, faces) = (spec.polyhedron(), spec.faces()?);
     let sides = Sides::new(&solid);
@@ -118,8 +129,8 @@ fn seamed(
         .collect()
 }
 
-/// Nests pieces of whole faces on pages. They go on the smallest paper that fits all of them on one page. Otherwise
-/// they go on as few pages as possible of the requested size, or of the largest.
+/// Nests pieces of whole faces on pages. They go on the smallest paper that fits all of them on one page, or on the allowed number
+/// of pages. Otherwise they go on as few pages as possible of the requested size, or of the largest.
 fn nested(
     spec: &SolidSpec,
     drawing: &Drawing,
@@ -128,6 +139,7 @@ fn nested(
     let sizes = paper.sizes();
     let flat = outlines(drawing.faces);
     let area: f64 = flat.iter().map(|face| polygon::area(face)).sum();
+    let most = paper.pages.map_or(1, |pages| pages.max(1) as usize);
     for (index, size) in sizes.iter().enumerate() {
         let paper = PaperSpec { size: Some(size.clone()), ..paper.clone() };
         let least = Footprint {
@@ -141,14 +153,22 @@ fn nested(
         let Some(page) = fit_upright(&least, &paper)? else { continue };
         let [left, lower, right, upper] = page.clear_mm();
         let room = DVec2::new(right - left - BLANK_MM, upper - lower - WORDS_MM - BLANK_MM);
-        if !is_last && area > room.element_product() {
+        if !is_last && area > most as f64 * room.element_product() {
             continue;
         }
         let Some(Nested { net, places, pages: count }) = nest_on(&flat, drawing.sides, room) else {
             continue;
         };
-        if count > 1 && !is_last {
+        if count > most && !is_last {
             continue;
+        }
+        if let Some(pages) = paper.pages.filter(|_| count > most) {
+            let problem = format!(
+                "the net of a solid with {} edges takes {count} pages of {size}, but {pages} are allowed: allow more, or use \
+                 a shorter {SolidEdgeMm} or a larger {PaperSize}",
+                format_mm(spec.edge_mm),
+            );
+            return Err(TargetError::invalid(PaperPages, problem));
         }
         if count > MAX_PAGES {
             let problem = format!(

@@ -12,6 +12,7 @@ use super::finishing::{Finishing, Laser};
 use super::meshes::{Meshes, PlateMeshes};
 use super::option_checks::{is_false, is_usual, length};
 use super::{logo, template};
+use crate::output::{NamedFile, named_by};
 use crate::values::{number, whole};
 use deltille::export::dsc::Dialect;
 use deltille::family::positions;
@@ -29,6 +30,8 @@ pub const DPI: RangeInclusive<u32> = 200..=2400;
 pub const TAGS: &str = "Tags";
 /// Help heading: paper.
 pub const PAPER: &str = "Paper";
+/// Help heading: names and treatment of the output files.
+pub const OUTPUT: &str = "Output";
 /// Help heading: files to print and lists.
 pub const PRINT: &str = "Print files and corner lists";
 
@@ -149,16 +152,16 @@ pub struct BoardSettings {
     #[arg(long, help_heading = PRINT, value_parser = whole(DPI))]
     dpi: Option<u32>,
     /// Text for the label of every sheet, next to the name, such as the owner
-    #[arg(long, value_name = "TEXT")]
+    #[arg(long, help_heading = PAPER, value_name = "TEXT")]
     note: Option<String>,
     /// SVG logo, printed in black opposite the label: filled paths and strokes; white areas stay unprinted
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = PAPER, value_name = "FILE")]
     logo: Option<String>,
     /// Height of the logo [default: the height of the label strip]
-    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    #[arg(long, help_heading = PAPER, value_name = "LENGTH", allow_hyphen_values = true)]
     logo_height: Option<String>,
     /// Stem of the file names, also printed on the sheet [default: board or checkerboard]
-    #[arg(long)]
+    #[arg(long, help_heading = OUTPUT)]
     name: Option<String>,
     /// Thickness of the plate in a mesh, parsed by [`PlateMeshes`].
     #[arg(skip)]
@@ -283,6 +286,24 @@ impl BoardSettings {
             laser: self.laser.or(template.laser),
             finishing: self.finishing.or(template.finishing, self.pdf || !formats),
         }
+    }
+
+    /// Extensions of the files that can be named by `-o`.
+    pub const ENDINGS: [&str; 12] =
+        ["json", "pdf", "svg", "png", "dsc", "glb", "obj", "sdf", "urdf", "xml", "usda", "3mf"];
+
+    /// Returns these settings with the name and the format of the file that `-o` names.
+    pub fn for_file(mut self, file: Option<NamedFile>) -> anyhow::Result<Self> {
+        let (name, ending) = named_by(self.name.take(), file)?;
+        self.name = name;
+        match ending.as_str() {
+            "pdf" => self.pdf = true,
+            "svg" => self.svg = true,
+            "png" => self.png = true,
+            "dsc" => self.dsc = true,
+            of_mesh => self.meshes.request(of_mesh),
+        }
+        Ok(self)
     }
 
     /// Returns the requested meshes of the plate.

@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use super::option_checks::{is_false, length, refuse_idle};
 use crate::deltille::files::written::{File, bytes_file};
-use crate::values::{number, whole};
+use crate::output::log;
+use crate::values::{Grid, number, whole};
 use deltille::export::artifacts::{Making, What, make, of_mesh};
 use deltille::export::inlay::InlaidBodies;
 use deltille::export::mesh::{MAX_TEXTURE_PX, MeshError, Meshing, Resolution, TexturedMesh};
@@ -32,7 +33,7 @@ const TEXTURE_DPI: RangeInclusive<f64> = 1.0..=1e5;
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 #[command(next_help_heading = MESHES)]
 pub struct Meshes {
-    /// Write <name>.glb, the textured mesh as glTF 2.0 (metres); default for solids if no other file is requested
+    /// Write <name>.glb, the textured mesh as glTF 2.0 (metres); with --pdf the default of solids
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     gltf: bool,
@@ -66,6 +67,12 @@ pub struct Meshes {
     /// less than the depth at which inlays of adjacent faces would meet [default: 0.4mm]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     inlay: Option<String>,
+    /// Width and depth of the printer's bed in mm, for a warning if the 3MF is larger [default: 256x256]
+    #[arg(long, value_name = "WxD")]
+    bed: Option<String>,
+    /// Diameter of the printer's nozzle, for a warning if cells of tags in the 3MF are smaller [default: 0.4mm]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    nozzle: Option<String>,
     /// Longest side of the texture in px; at least 4 px per tag cell, 12 px on checkerboards [default: 20 px per
     /// cell, limited to 16384 px]
     #[arg(long, value_name = "PX", value_parser = whole(SIDE_PX))]
@@ -94,10 +101,29 @@ impl Meshes {
             usd: self.usd || template.usd,
             threemf: self.threemf || template.threemf,
             inlay: self.inlay.or(template.inlay),
+            bed: self.bed.or(template.bed),
+            nozzle: self.nozzle.or(template.nozzle),
             // Size and resolution exclude each other.
             texture: self.texture.or(template.texture.filter(|_| !is_sized)),
             texture_dpi: self.texture_dpi.or(template.texture_dpi.filter(|_| !is_sized)),
             textures: self.textures.or(template.textures),
+        }
+    }
+
+    /// Extensions of the meshes.
+    pub const ENDINGS: [&str; 7] = ["glb", "obj", "sdf", "urdf", "xml", "usda", "3mf"];
+
+    /// Requests the mesh with this extension, if it is one of [`ENDINGS`](Self::ENDINGS).
+    pub fn request(&mut self, ending: &str) {
+        match ending {
+            "glb" => self.gltf = true,
+            "obj" => self.obj = true,
+            "sdf" => self.sdf = true,
+            "urdf" => self.urdf = true,
+            "xml" => self.mjcf = true,
+            "usda" => self.usd = true,
+            "3mf" => self.threemf = true,
+            _ => {}
         }
     }
 
@@ -124,11 +150,6 @@ impl Meshes {
         formats.into_iter().filter(|(is_asked, _)| *is_asked).map(|(_, what)| what)
     }
 
-    /// Returns these meshes and the glTF.
-    pub fn with_gltf(self) -> Self {
-        Self { gltf: true, ..self }
-    }
-
     /// Whether an OBJ is among the files.
     pub fn has_obj(&self) -> bool {
         self.obj || self.sdf || self.urdf || self.mjcf
@@ -143,6 +164,8 @@ impl Meshes {
             ("--texture-dpi", self.texture_dpi.is_some(), textured, "a mesh, such as --gltf"),
             ("--plate", plate.is_some(), any, "a mesh, such as --gltf"),
             ("--inlay", self.inlay.is_some(), self.threemf, "--3mf"),
+            ("--bed", self.bed.is_some(), self.threemf, "--3mf"),
+            ("--nozzle", self.nozzle.is_some(), self.threemf, "--3mf"),
         ])?;
         // A template may contain combinations that the option parser would reject.
         if self.texture.is_some() && self.texture_dpi.is_some() {
@@ -173,13 +196,14 @@ impl Meshes {
         let mut meshing = Meshing::default();
         meshing.plate_mm = plate_mm.unwrap_or(meshing.plate_mm);
         meshing.inlay_mm = length("inlay", &self.inlay)?.unwrap_or(meshing.inlay_mm);
-        let (mut files, description) = match self.is_textured() {
+        let (mut files, mut description) = match self.is_textured() {
             true => self.textured(target, meshing)?,
             false => (Vec::new(), String::new()),
         };
         if self.threemf {
             let bodies = InlaidBodies::new(target, meshing);
             let bodies = bodies.map_err(|error| refusal(&error, Some("--3mf")))?;
+            description += &self.described(target, &bodies)?;
             files.push(bytes_file(format!("{}.3mf", target.name), threemf::to_bytes(&bodies)));
             if matches!(&target.spec, TargetSpec::Solid(spec) if spec.skeleton.is_some()) {
                 let skeleton = make(&target.clone().into(), What::Skeleton3mf, Making::default());
@@ -188,6 +212,40 @@ impl Meshes {
             }
         }
         Ok((files, description))
+    }
+
+    /// Describes a 3MF in one line, and warns if it may be too large or too fine for the printer.
+    fn described(&self, target: &Target, bodies: &InlaidBodies) -> anyhow::Result<String> {
+        let bed: Grid = self
+            .bed
+            .as_deref()
+            .unwrap_or("256x256")
+            .parse()
+            .map_err(|why| anyhow!("--bed: {why}"))?;
+        let bed = bed.0.map(f64::from);
+        let nozzle_mm = length("nozzle", &self.nozzle)?.unwrap_or(0.4);
+        let size = bodies.size_mm();
+        let [longest, shortest] = [size.x.max(size.y), size.x.min(size.y)];
+        let scale = (bed[0].max(bed[1]) / longest).min(bed[0].min(bed[1]) / shortest);
+        if scale < 1.0 {
+            let edge = edge_of(target)
+                .map_or(String::new(), |mm| format!("; --edge {}mm fits", (mm * scale).floor()));
+            log!(
+                "warning: --3mf: {:.0} × {:.0} mm do not fit on a bed of {} × {} mm (--bed){edge}",
+                size.x,
+                size.y,
+                bed[0],
+                bed[1]
+            );
+        }
+        let cells = bodies.cell_mm.map_or(String::new(), |mm| format!(", cells of {mm:.2} mm"));
+        if let Some(mm) = bodies.cell_mm.filter(|mm| *mm < nozzle_mm) {
+            log!(
+                "warning: --3mf: cells of tags are {mm:.2} mm wide, less than the nozzle (--nozzle {nozzle_mm}mm): use a longer \
+                 --edge, or a family with fewer bits"
+            );
+        }
+        Ok(format!("\n3mf: {:.1} × {:.1} × {:.1} mm{cells}", size.x, size.y, size.z))
     }
 
     /// Returns the requested textured files, and a line about the texture.
@@ -215,6 +273,17 @@ impl Meshes {
             self.textured_formats().flat_map(|what| of_mesh(&mesh, what)).collect();
         let files = files.into_iter().map(|(name, bytes)| bytes_file(name, bytes)).collect();
         Ok((files, describe(&mesh)))
+    }
+}
+
+/// Returns the length that the option `--edge` sets, mm.
+fn edge_of(target: &Target) -> Option<f64> {
+    match &target.spec {
+        TargetSpec::Board(spec) => Some(spec.edge_mm),
+        TargetSpec::Solid(spec) => Some(spec.edge_mm),
+        TargetSpec::Charuco(spec) => Some(spec.square_mm),
+        TargetSpec::AprilGrid(spec) => Some(spec.tag_mm),
+        _ => None,
     }
 }
 

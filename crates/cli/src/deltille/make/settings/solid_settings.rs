@@ -7,16 +7,17 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow, bail};
 use serde::{Deserialize, Serialize};
 
-use super::board_settings::{DPI, PAPER, PRINT, TAGS, check_tags};
+use super::board_settings::{DPI, OUTPUT, PAPER, PRINT, TAGS, check_tags};
 use super::finishing::Laser;
 use super::meshes::Meshes;
 use super::option_checks::{is_false, is_usual, length, refuse_idle};
 use super::{logo, template};
+use crate::output::{NamedFile, named_by};
 use crate::values::{number, whole};
 use deltille::export::dsc::Dialect;
 use deltille::family::positions;
 use deltille::lattice::GridKind;
-use deltille::layout::{DEFAULT_MARGIN_MM, PaperSize, PaperSpec, SolidSheets};
+use deltille::layout::{DEFAULT_MARGIN_MM, PaperSize, PaperSpec, SolidSheets, usual_solid_edge_mm};
 use deltille::targets::{
     BORDER_BITS, FACE_TILES, MAX_ROWS, SkeletonSpec, SolidShape, SolidSpec, TagSpec, TagsIn,
 };
@@ -46,7 +47,8 @@ pub struct SolidSettings {
     #[arg(skip)]
     #[serde(skip_serializing_if = "is_false")]
     pub allow_skew: bool,
-    /// Edge length of the solid, such as 150mm, 15cm, 6in [default: 150mm]
+    /// Edge length of the solid, such as 150mm, 15cm, 6in [default: 150mm, or the largest whole number of millimetres
+    /// whose net fits --paper on --pages]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     pub edge: Option<String>,
     /// Number of black tiles along each side of a face, 6 to 200 [default: 10]
@@ -153,11 +155,15 @@ pub struct SolidSettings {
     pub dpi: Option<u32>,
     /// The paper; a larger net is split between faces into several pieces.
     #[arg(long, help_heading = PAPER, value_name = "SIZE", help = format!(
-        "{}; a larger net is split between faces into several pieces [default: the smallest of A4 to A0 that fits it, \
-         otherwise A0]",
+        "{}. Without --edge, the net has the size that fits it; with --edge, a larger net is split between faces into several \
+         pieces [default: the smallest of A4 to A0 that fits the net, otherwise A0]",
         PaperSize::choice()
     ))]
     pub paper: Option<String>,
+    /// Largest number of pages for the net. Without --paper, the smallest paper is selected for it [default: 1 if it fits A0]
+    #[arg(long, help_heading = PAPER, value_name = "N", value_parser = whole(1..=MAX_ROWS),
+          conflicts_with = "per_face")]
+    pub pages: Option<u32>,
     /// Page orientation: auto, portrait or landscape [default: auto]
     #[arg(long, help_heading = PAPER)]
     pub orientation: Option<String>,
@@ -165,16 +171,16 @@ pub struct SolidSettings {
     #[arg(long, help_heading = PAPER, value_name = "LENGTH", allow_hyphen_values = true)]
     pub margin: Option<String>,
     /// Text for the label of every sheet, next to the name, such as the owner
-    #[arg(long, value_name = "TEXT")]
+    #[arg(long, help_heading = PAPER, value_name = "TEXT")]
     pub note: Option<String>,
     /// SVG logo, printed in black opposite the label: filled paths and strokes; white areas stay unprinted
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = PAPER, value_name = "FILE")]
     pub logo: Option<String>,
     /// Height of the logo [default: the height of the label strip]
-    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    #[arg(long, help_heading = PAPER, value_name = "LENGTH", allow_hyphen_values = true)]
     pub logo_height: Option<String>,
     /// Stem of the file names, also printed on the sheets [default: the solid's name]
-    #[arg(long)]
+    #[arg(long, help_heading = OUTPUT)]
     pub name: Option<String>,
     /// Meshes.
     #[arg(skip)]
@@ -243,6 +249,7 @@ impl SolidSettings {
             dsc: self.dsc || template.dsc,
             dsc_dialect: self.dsc_dialect.or(template.dsc_dialect),
             paper: self.paper.or(template.paper),
+            pages: self.pages.or(template.pages.filter(|_| !self.per_face)),
             orientation: self.orientation.or(template.orientation),
             margin: self.margin.or(template.margin),
             note: self.note.or(template.note),
@@ -252,6 +259,27 @@ impl SolidSettings {
             meshes: self.meshes.or(template.meshes),
             laser: self.laser.or(template.laser),
         }
+    }
+
+    /// Extensions of the files that can be named by `-o`.
+    pub const ENDINGS: [&str; 13] = [
+        "json", "pdf", "svg", "png", "dsc", "stl", "glb", "obj", "sdf", "urdf", "xml", "usda",
+        "3mf",
+    ];
+
+    /// Returns these settings with the name and the format of the file that `-o` names.
+    pub fn for_file(mut self, file: Option<NamedFile>) -> anyhow::Result<Self> {
+        let (name, ending) = named_by(self.name.take(), file)?;
+        self.name = name;
+        match ending.as_str() {
+            "pdf" => self.pdf = true,
+            "svg" => self.svg = true,
+            "png" => self.png = true,
+            "dsc" => self.dsc = true,
+            "stl" => self.stl = true,
+            of_mesh => self.meshes.request(of_mesh),
+        }
+        Ok(self)
     }
 
     /// Rejects shape settings of another solid in a template.
@@ -277,13 +305,23 @@ impl SolidSettings {
         self.pdf || self.svg || self.png
     }
 
+    /// Returns these settings with the net and the textured mesh if no file is requested.
+    pub fn with_default_files(mut self) -> Self {
+        let bodies = self.stl || self.skeleton || self.dxf || self.laser.is_any();
+        if !(bodies || self.printed() || self.meshes.is_any()) {
+            self.pdf = true;
+            self.meshes.request("glb");
+        }
+        self
+    }
+
     /// Rejects options without effect.
     pub fn check_use(&self) -> anyhow::Result<()> {
         let layout = self.printed() || self.dxf;
         let needed = "--pdf, --svg, --png or --dxf";
         refuse_idle(&[
             ("--dpi", self.dpi.is_some(), self.png, "--png"),
-            ("--paper", self.paper.is_some(), layout, needed),
+            ("--pages", self.pages.is_some(), layout || self.paper.is_some(), needed),
             ("--orientation", self.orientation.is_some(), layout, needed),
             ("--margin", self.margin.is_some(), layout, needed),
             ("--per-face", self.per_face, layout, needed),
@@ -306,10 +344,11 @@ impl SolidSettings {
     }
 
     /// Returns the specification of a solid with this shape.
-    pub fn spec(&self, shape: SolidShape) -> anyhow::Result<SolidSpec> {
+    pub fn spec(&self, shape: SolidShape, paper: &PaperSpec) -> anyhow::Result<SolidSpec> {
         let default = SolidSpec::new(shape);
+        let edge_mm = length("edge", &self.edge)?;
         let mut spec = SolidSpec {
-            edge_mm: length("edge", &self.edge)?.unwrap_or(default.edge_mm),
+            edge_mm: edge_mm.unwrap_or(default.edge_mm),
             tiles: self.tiles.unwrap_or(default.tiles),
             margin_mm: default.margin_mm,
             board_id: self.board_id.unwrap_or(default.board_id),
@@ -319,6 +358,9 @@ impl SolidSettings {
             skeleton: self.skeleton()?,
             shape: default.shape,
         };
+        if edge_mm.is_none() && !matches!(spec.shape, SolidShape::Cuboid(_) | SolidShape::Mesh(_)) {
+            spec.edge_mm = usual_solid_edge_mm(&spec, paper);
+        }
         spec.margin_mm = match length("face-margin", &self.face_margin)? {
             Some(given) => given,
             None => spec.comfortable_margin_mm()?,
@@ -402,6 +444,7 @@ impl SolidSettings {
                 (false, true) => SolidSheets::SeamedNet,
                 (false, false) => SolidSheets::Net,
             },
+            pages: self.pages,
             note: self.note.clone(),
             tag_ids: self.tag_ids,
             guide_page: self.guide_page,
