@@ -54,9 +54,8 @@ pub fn place(output: &Path, endings: &[&str]) -> anyhow::Result<Place> {
     );
     ensure!(
         endings.contains(&ending.as_str()),
-        "-o {shown}: this command does not write .{ending} files; use {}{}, or a folder",
-        without.display(),
-        any_of(&known),
+        "-o: {shown} must end in {}, or be a folder",
+        any_of(&known)
     );
     let stem = output.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let file = Some(NamedFile { stem, ending });
@@ -370,7 +369,7 @@ mod tests {
         }
         let file = Some(NamedFile { stem: "desk".to_owned(), ending: "pdf".to_owned() });
         assert_eq!(of("new/desk.PDF"), Ok(Place { folder: "new".into(), file }));
-        let error = "-o desk.stl: this command does not write .stl files; use desk.pdf or .svg, or a folder";
+        let error = "-o: desk.stl must end in .pdf or .svg, or be a folder";
         assert_eq!(of("desk.stl"), Err(error.to_owned()));
         assert!(place(Path::new("desk.json"), &[]).is_err());
         assert!(of("-").is_err());

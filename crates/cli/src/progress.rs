@@ -23,7 +23,30 @@ pub fn bar(total: u64, unit: &str) -> ProgressBar {
         "{{spinner}} {{elapsed_precise}} {{wide_bar}} {{percent:>3}} %  {position}{{eta_precise}} left  {{msg}}"
     );
     let style = ProgressStyle::with_template(&template).expect("the template is well formed");
-    let bar = ProgressBar::new(total).with_style(style);
+    shown(ProgressBar::new(total).with_style(style))
+}
+
+/// A spinner with the elapsed time on a terminal, for work of unknown length; removed when it is dropped.
+pub struct Spinner(ProgressBar);
+
+impl Spinner {
+    /// Creates a spinner beside a description of the work.
+    pub fn new(work: &'static str) -> Self {
+        let style = ProgressStyle::with_template("{spinner} {elapsed_precise}  {msg}");
+        let spinner =
+            ProgressBar::new_spinner().with_style(style.expect("the template is well formed"));
+        Self(shown(spinner.with_message(work)))
+    }
+}
+
+impl Drop for Spinner {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
+/// Returns a bar that is updated regularly, or hidden with `--quiet`.
+fn shown(bar: ProgressBar) -> ProgressBar {
     if terminal::is_quiet() {
         bar.set_draw_target(ProgressDrawTarget::hidden());
     } else {

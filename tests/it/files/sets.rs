@@ -55,10 +55,7 @@ fn a_new_folder_with_the_name_of_a_file_is_refused() {
         "rig --camera a=a --camera b=b --target b.json",
         "calibrate none --target b.json",
     ] {
-        refused(
-            &format!("{args} -o out.stp"),
-            "-o out.stp: this command does not write .stp files; use out.",
-        );
+        refused(&format!("{args} -o out.stp"), "-o: out.stp must end in .");
     }
     refused(
         "rectify r.json --pair a,b -o out.yaml",

@@ -184,7 +184,7 @@ fn proposals_stay_within_the_distances() {
 fn it_ends_when_a_view_gains_little_or_the_limit_is_reached() {
     let (_, _, few) = guided(5, |guide| guide);
     assert!(!few.next.is_enough(None), "{:?}", few.next.gain());
-    let (_, _, many) = guided(22, |guide| guide);
+    let (_, _, many) = guided(26, |guide| guide);
     assert!(many.next.is_enough(None), "{:?}", many.next.gain());
     let now = many.next.now_px.unwrap();
     assert!(many.next.is_enough(Some(1.01 * now)) && !many.next.is_enough(Some(0.99 * now)));

@@ -8,6 +8,7 @@ use anyhow::{Context, ensure};
 use super::solving::ModelChoice;
 use crate::deltille::files::written::{File, sample_of, text_file};
 use crate::output::log;
+use crate::progress::Spinner;
 use deltille::calibrate::{Calibration, CameraTiming, Candidate, Model, Timing};
 use deltille::detect::Detection;
 use deltille::export::timing as timing_file;
@@ -56,6 +57,7 @@ pub fn prepare(
     options: &[String],
     frames: Option<&AllFrames>,
 ) -> anyhow::Result<Prepared> {
+    let spinner = Spinner::new("selecting models");
     let choose = |calibration: &mut Calibration| -> anyhow::Result<Vec<Vec<Candidate>>> {
         let cameras = options.iter().enumerate();
         let tried = cameras.map(|(camera, option)| {
@@ -90,6 +92,7 @@ pub fn prepare(
     if !others.is_empty() {
         (*calibration, timing) = compensated(&all)?;
     }
+    drop(spinner);
     timing.warnings().iter().for_each(|said| log!("warning: {said}"));
     Ok(Prepared { tried, timing: Some(timing) })
 }

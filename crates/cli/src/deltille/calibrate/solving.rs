@@ -13,6 +13,7 @@ use super::constraints::ConstraintArgs;
 use super::covariance_file::CovarianceArgs;
 use crate::deltille::files::written::{File, sample_of, text_file};
 use crate::output::{self, Overwrite, fixed, log};
+use crate::progress::Spinner;
 use crate::run::FAILED;
 use crate::values::{distance, whole};
 use deltille::calibrate::{
@@ -266,6 +267,7 @@ impl SolveArgs {
             .distances_mm(self.uncertainty_at.clone())
             .covariance_of_all(self.covariance.is_wanted())
             .hold_out(self.holdout.map(|every| every as usize));
+        let _spinner = Spinner::new("calibrating");
         let estimate = calibration.solve().map_err(|error| {
             let option = match error {
                 CalibrationError::NothingHeldOut { .. } => Some("--holdout"),

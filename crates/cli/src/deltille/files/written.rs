@@ -6,9 +6,9 @@ use std::rc::Rc;
 
 use anyhow::{Context, anyhow, bail, ensure};
 
-use crate::interrupt;
 use crate::output::{self, Overwrite, log};
 use crate::run::{Interrupted, message};
+use crate::{interrupt, progress};
 use deltille::artwork::Artwork;
 use deltille::export::kind::Kind;
 use deltille::export::staging::{Staging, same_content};
@@ -148,15 +148,20 @@ impl<'a> Staged<'a> {
         interrupt::set_status("nothing was written");
         let staging = Staging::new(folder).with_context(|| cannot_write_to(folder))?;
         let staged = staging.files();
-        for file in files {
+        let bar = progress::bar(files.len() as u64, "files");
+        let written = files.iter().try_for_each(|file| {
             check_interrupt()?;
+            bar.set_message(file.name.clone());
             (file.write)(&staged.join(&file.name)).map_err(|error| {
                 // The name of the temporary folder means nothing to the user.
                 let staged = staged.display().to_string();
                 anyhow!(message(&error).replace(&staged, &folder.display().to_string()))
             })?;
-        }
-        check_interrupt()?;
+            bar.inc(1);
+            Ok(())
+        });
+        bar.finish_and_clear();
+        written.and_then(|()| check_interrupt())?;
         Ok(Self { folder, files, overwrite, staging })
     }
 

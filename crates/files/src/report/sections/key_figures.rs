@@ -54,9 +54,10 @@ const FILM_DIAGONAL_MM: f64 = 43.267;
 /// film.
 fn focal_length(camera: &Camera, notes: Option<&CameraNotes>) -> [Figure; 2] {
     let [fx, fy] = camera.focal_px.to_array();
-    let px = match fx == fy {
-        true => format!("{fx:.1} px"),
-        false => format!("{fx:.1}\u{a0}×\u{a0}{fy:.1} px"),
+    let [fx_text, fy_text] = [fx, fy].map(|focal| format!("{focal:.1}"));
+    let px = match fx_text == fy_text {
+        true => format!("{fx_text}\u{a0}px"),
+        false => format!("{fx_text}\u{a0}× {fy_text}\u{a0}px"),
     };
     let size_px = DVec2::new(f64::from(camera.width), f64::from(camera.height));
     let in_diagonals = f64::midpoint(fx, fy) / size_px.length();
