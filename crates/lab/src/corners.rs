@@ -102,7 +102,7 @@ impl Method {
         match self {
             Self::Polynomial(t) => format!("polynomial t = {t}"),
             Self::Model => "model".to_owned(),
-            Self::ModelWithTone => "model, tone auto".to_owned(),
+            Self::ModelWithTone => "model with tone curve".to_owned(),
         }
     }
 
