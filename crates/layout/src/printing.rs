@@ -15,7 +15,8 @@ use deltille_core::polygon::rectangle;
 use deltille_core::setting::Setting::{BoardEdgeMm, PaperNote, PaperPacked};
 use deltille_core::targets::shipped_family;
 use deltille_core::targets::{
-    BoardSpec, FamilyRef, Panel, SolidSpec, Target, TargetError, TargetSpec, fingerprint,
+    BoardSpec, FamilyRef, Panel, SolidShape, SolidSpec, Target, TargetError, TargetSpec,
+    fingerprint,
 };
 
 /// A target, and the sheets on which it is printed.
@@ -256,14 +257,17 @@ pub fn usual_edge_mm(spec: &BoardSpec, paper: &PaperSpec) -> f64 {
     fitting.unwrap_or(BoardSpec::DEFAULT_EDGE_MM)
 }
 
-/// Returns the default edge of a regular solid, mm. Without a fixed paper size, that is the edge of the published icosahedron.
-/// With a fixed size, it is the largest whole number of millimetres with which the net fits on the allowed number of pages (one
-/// by default), or each face on its page. If nothing fits, building the solid reports the error.
+/// Returns the default edge of a solid, mm. Without a fixed paper size, that is the edge of the published icosahedron.
+/// With a fixed size, that of a regular solid is the largest whole number of millimetres with which the net fits on the
+/// allowed number of pages (one by default), or each face on its page. If nothing fits, building the solid reports the
+/// error.
 pub fn usual_solid_edge_mm(spec: &SolidSpec, paper: &PaperSpec) -> f64 {
     let usual = SolidSpec::new(spec.shape.clone()).edge_mm;
-    // Nets with seams are for solids larger than the paper.
-    let is_fitted =
-        paper.size.is_some() && (paper.solids != SolidSheets::SeamedNet || paper.pages.is_some());
+    // Cuboids and meshes have a size of their own. Nets with seams are for solids larger than the paper.
+    let is_regular = !matches!(spec.shape, SolidShape::Cuboid(_) | SolidShape::Mesh(_));
+    let is_fitted = is_regular
+        && paper.size.is_some()
+        && (paper.solids != SolidSheets::SeamedNet || paper.pages.is_some());
     if !is_fitted {
         return usual;
     }

@@ -437,6 +437,26 @@ mod tests {
     }
 
     #[test]
+    fn the_usual_edge_is_the_largest_that_fits_the_pages() {
+        use SolidShape::{Cube, Octahedron, Tetrahedron};
+        for (shape, size, pages) in
+            [(Tetrahedron, "A4", None), (Octahedron, "A4", Some(3)), (Cube, "A3", Some(2))]
+        {
+            let paper =
+                PaperSpec { size: Some(size.parse().unwrap()), pages, ..PaperSpec::default() };
+            let spec = SolidSpec { tags: None, ..SolidSpec::new(shape) };
+            let edge_mm = crate::usual_solid_edge_mm(&spec, &paper);
+            let count = |edge_mm: f64| {
+                let spec = TargetSpec::Solid(SolidSpec { edge_mm, ..spec.clone() });
+                let printing = Printing::build("net", &spec, None, Some(&paper));
+                printing.map_or(usize::MAX, |printing| printing.page_count())
+            };
+            let most = pages.unwrap_or(1) as usize;
+            assert!(count(edge_mm) <= most && count(edge_mm + 1.0) > most, "{edge_mm}");
+        }
+    }
+
+    #[test]
     fn the_smallest_paper_that_fits_the_net_is_used() {
         let family = Family::shipped("delTag25h7").unwrap();
         let size = |shape| {

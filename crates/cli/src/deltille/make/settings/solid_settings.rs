@@ -348,7 +348,7 @@ impl SolidSettings {
         let default = SolidSpec::new(shape);
         let edge_mm = length("edge", &self.edge)?;
         let mut spec = SolidSpec {
-            edge_mm: edge_mm.unwrap_or(default.edge_mm),
+            edge_mm: default.edge_mm,
             tiles: self.tiles.unwrap_or(default.tiles),
             margin_mm: default.margin_mm,
             board_id: self.board_id.unwrap_or(default.board_id),
@@ -358,9 +358,7 @@ impl SolidSettings {
             skeleton: self.skeleton()?,
             shape: default.shape,
         };
-        if edge_mm.is_none() && !matches!(spec.shape, SolidShape::Cuboid(_) | SolidShape::Mesh(_)) {
-            spec.edge_mm = usual_solid_edge_mm(&spec, paper);
-        }
+        spec.edge_mm = edge_mm.unwrap_or_else(|| usual_solid_edge_mm(&spec, paper));
         spec.margin_mm = match length("face-margin", &self.face_margin)? {
             Some(given) => given,
             None => spec.comfortable_margin_mm()?,
