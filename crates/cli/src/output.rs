@@ -3,9 +3,10 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, anyhow, bail, ensure};
 
 use crate::terminal;
+use deltille::Name;
 use deltille::export::kind::Kind;
 use deltille::export::{atomic, staging};
 use deltille::limits::{Limits, ReadError};
@@ -69,6 +70,7 @@ pub fn named_by(
     file: Option<NamedFile>,
 ) -> anyhow::Result<(Option<String>, String)> {
     let Some(NamedFile { stem, ending }) = file else { return Ok((name, String::new())) };
+    Name::without_dots(&stem).map_err(|why| anyhow!("-o: {why}"))?;
     match name.filter(|name| *name != stem) {
         Some(name) => bail!(
             "--name: -o already names the files {stem}; remove --name {name}, or use a folder as -o"
@@ -88,10 +90,8 @@ fn any_of(words: &[String]) -> String {
 /// Returns the file that `-o` means, see [`place`]: in a folder, `<stem>.<extension>`.
 pub fn file(output: &Path, stem: &str, extension: &str) -> anyhow::Result<PathBuf> {
     let Place { folder, file } = place(output, &[extension])?;
-    Ok(match file {
-        Some(_) => output.to_owned(),
-        None => folder.join(format!("{stem}.{extension}")),
-    })
+    let stem = file.map_or(stem.to_owned(), |file| file.stem);
+    Ok(folder.join(format!("{stem}.{extension}")))
 }
 
 /// Returns the path of the page of `--report`: a file that ends in .html, or a folder. Rejects unusable paths before the work
@@ -165,11 +165,10 @@ macro_rules! report {
 }
 pub(crate) use report;
 
-/// Prints a line on standard error; with `--quiet`, only warnings and errors.
+/// Prints a line on standard error; with `--quiet`, no notes.
 pub(crate) fn log_line(text: &str) {
-    let is_needed =
-        ["error:", "warning:", "interrupted:"].iter().any(|start| text.starts_with(start));
-    if is_needed || !terminal::is_quiet() {
+    let is_note = ["note:", "ink:"].iter().any(|start| text.starts_with(start));
+    if !(is_note && terminal::is_quiet()) {
         // Standard error may be closed.
         let mut stderr = std::io::stderr();
         let _ = stderr.write_all(terminal::coloured(&line(text), &std::io::stderr()).as_bytes());
@@ -301,9 +300,9 @@ pub fn folder_of(path: &Path) -> &Path {
 
 /// Extensions of files that these programs write, and of images and videos. A new folder with such a name was probably
 /// meant to be a file.
-const OF_FILES: &str = "3mf avi bmp c cameramodel csv dsc dxf eps glb gltf h html jpeg jpg json mkv mov mp4 mtl ndjson npy npz \
+const OF_FILES: &str = "3mf avi bmp c cameramodel csv dsc dxf eps glb gltf gz h html jpeg jpg json mkv mov mp4 mtl ndjson npy npz \
                         obj orpc parquet pdf ply png ps py rs sdf step stl stp svg tif tiff toml txt urdf usd usda usdz \
-                        webp xml yaml yml";
+                        webp xml yaml yml zip";
 
 /// Whether an extension is one of these, or that of another kind of file.
 fn is_of_file(ending: &str, endings: &[&str]) -> bool {

@@ -135,7 +135,9 @@ impl FrameProgress {
                 return;
             }
             *last = Instant::now();
-            log!("{}", self.line(part));
+            if !terminal::is_quiet() {
+                log!("{}", self.line(part));
+            }
         } else {
             self.bar.set_message(self.line(part));
         }
@@ -154,7 +156,7 @@ impl FrameProgress {
     /// Removes the line, and reports the number of frames.
     pub fn end(self) {
         self.bar.finish_and_clear();
-        if self.frames > 0 {
+        if self.frames > 0 && !terminal::is_quiet() {
             log!("{}", self.line(None));
         }
     }

@@ -126,8 +126,14 @@ fn without_help_of_help(mut arguments: Vec<OsString>) -> Vec<OsString> {
 }
 
 /// Options of other programs and of other commands of this one, and the option that does the same.
-const INSTEAD: [(&str, &str); 3] =
-    [("--dxf", "--laser dxf"), ("--glb", "--gltf"), ("--squares", "--rows and --cols")];
+const INSTEAD: [(&str, &str); 6] = [
+    ("--cols", "--squares, --tags or --circles"),
+    ("--dxf", "--laser dxf"),
+    ("--glb", "--gltf"),
+    ("--rows", "--squares, --tags or --circles"),
+    ("--squares", "--rows and --cols"),
+    ("--stl", "--3mf or --gltf"),
+];
 
 /// Returns the first paragraph of a clap message and its tip on one line.
 fn one_line(error: &clap::Error, arguments: &[OsString]) -> String {

@@ -70,7 +70,7 @@ const fn named(setting: Setting) -> (&'static str, &'static str) {
         Setting::RegionImage => ("deltille compare", "--region image"),
         Setting::RigWrite => ("deltille rig", ""),
         Setting::SightingBend => ("deltille calibrate", "--shape"),
-        Setting::SightingStretch => ("deltille calibrate", "--print-scale"),
+        Setting::SightingStretch => ("deltille calibrate", "--measured"),
         Setting::SkeletonPanelThicknessMm => ("deltille icosahedron", "--panel-thickness"),
         Setting::SkeletonRibMm => ("deltille icosahedron", "--rib"),
         Setting::SkeletonWallMm => ("deltille icosahedron", "--wall"),

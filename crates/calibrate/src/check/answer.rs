@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use deltille_core::setting::Setting::CalibrationWrite;
+use deltille_core::setting::Setting::{CalibrationMeasureTarget, CalibrationWrite};
 
 /// Whether a camera or a rig is still as calibrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -273,9 +273,10 @@ impl fmt::Display for Missing {
                 )?;
                 match shown {
                     Some(shown) => shown.fmt(to),
-                    None => to.write_str(
-                        "the calibration itself is too uncertain; calibrate again with more views, and with a measured \
-                         target or --board-accuracy",
+                    None => write!(
+                        to,
+                        "the calibration itself is too uncertain; calibrate again with more views, and measure the target \
+                         ({CalibrationMeasureTarget}) or state the accuracy of the board"
                     ),
                 }
             }

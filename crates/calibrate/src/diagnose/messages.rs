@@ -358,7 +358,9 @@ impl<'a> Messages<'a> {
         let scale = match self.print_scale {
             // A scale that is equal along x and y leaves no residuals.
             Some([across, up]) if across != up => {
-                format!("{SightingStretch} {across},{up} does not match the print, or ")
+                format!(
+                    "the print scale {across:.4},{up:.4} ({SightingStretch}) does not match the print, or "
+                )
             }
             _ => String::new(),
         };

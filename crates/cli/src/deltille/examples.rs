@@ -29,7 +29,7 @@ pub const CIRCLES: &str = "Examples:
 
 pub const SOLID: &str = "Examples:
   deltille icosahedron --edge 150mm --pdf --name ico -o ico
-  deltille octahedron --paper A4 --pdf
+  deltille octahedron --paper A4 --pages 2 --pdf
   deltille icosahedron --skeleton --per-face --pdf --dxf --name rigid -o rigid
   deltille tetrahedron --usd --texture 4096";
 
@@ -72,7 +72,7 @@ pub const CALIBRATE: &str = "Examples:
   deltille calibrate run.mcap --topic /camera/image_raw --target desk/desk.json -o camera.yaml
   deltille calibrate photos --target desk/desk.json --model radtan --holdout 4
   deltille calibrate corners --grid checker --rows 8 --cols 11 --edge 25mm --model radtan5
-  deltille calibrate corners --target desk/desk.json --print-scale 1.0012,0.9995";
+  deltille calibrate corners --target desk/desk.json --measured 270.3,199.9";
 
 pub const RIG: &str = "Examples:
   deltille rig run.mcap --topic /left/image_raw --topic /right/image_raw --target desk/desk.json
@@ -111,4 +111,5 @@ pub const UNDISTORT: &str = "Examples:
   deltille undistort run.mcap --topic /left/image_raw --every 30 --camera left.yaml -o straight";
 
 pub const RECTIFY: &str = "Examples:
-  deltille rectify rig.json --pair left,right -o rectified";
+  deltille rectify rig.json --pair left,right -o rectified
+  deltille rectify rig.json --pair left,right --first left --second right -o rectified";

@@ -159,7 +159,7 @@ enum Command {
     #[command(after_help = examples::UNDISTORT)]
     Undistort(undistort::Args),
     /// Rectify two cameras of a rig, so that a point is in the same row of both images
-    #[command(after_help = examples::RECTIFY)]
+    #[command(after_help = examples::RECTIFY, mut_arg("output", |arg| arg.help("Output folder")))]
     Rectify(undistort::PairArgs),
     /// Measure the run time of the detection stages on this machine
     Bench(bench::Args),

@@ -14,7 +14,7 @@ use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::written::{check_places, sample_of, text_file};
 use crate::deltille::files::{camera_file, target_file};
 use crate::interrupt;
-use crate::output::{self, Overwrite, log, say};
+use crate::output::{self, Overwrite, log, report, say};
 use crate::run::Interrupted;
 use crate::values::distance;
 use deltille::calibrate::{
@@ -197,7 +197,7 @@ impl Args {
     /// Returns the paths of the next view. Rejects unusable paths before the first photograph.
     fn places(&self) -> anyhow::Result<Places> {
         let json = self.output.as_deref().map(|path| output::file(path, "next", "json"));
-        let json = json.transpose().context("-o")?;
+        let json = json.transpose()?;
         let picture = self.picture.clone();
         if let Some(path) = &picture {
             let end = path.extension().map(|end| end.to_string_lossy().to_lowercase());
@@ -371,7 +371,7 @@ impl Watch<'_> {
             log!("{show}: no board found{why}");
             return Ok(Some(Seen::Nothing));
         }
-        say!("{show}: {}", counted(corners, "corner"));
+        report!("{show}: {}", counted(corners, "corner"));
         *last = Some(picture);
         Ok(Some(Seen::Target(Box::new(found))))
     }

@@ -68,6 +68,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     // Poses with a fixed camera must not replace its calibration.
     let stem = if args.fixed_intrinsics.is_some() { "poses" } else { "camera" };
     let place = output::place(args.output.as_deref().unwrap_or(Path::new(".")), &["yaml", "json"])?;
+    if let (Some(file), false) =
+        (&place.file, args.format.iter().any(|format| format.name() == "own"))
+    {
+        log!(
+            "note: {}.{} is not written, because --format does not contain own",
+            file.stem,
+            file.ending
+        );
+    }
     let stem = place.file.map_or(stem.to_owned(), |file| file.stem);
     let path = place.folder.join(format!("{stem}.yaml"));
     if let Some(known) = &args.fixed_intrinsics {

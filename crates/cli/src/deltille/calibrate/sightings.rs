@@ -26,7 +26,7 @@ use deltille::lattice::GridKind;
 use deltille::layout::{CheckBar, Printing, SheetLayout};
 use deltille::limits::Limits;
 use deltille::targets::{SIDES, Target, TargetIdentity, format_mm, parse_length_mm};
-use deltille_core::quantity::{edge_mm, print_scale};
+use deltille_core::quantity::{Range, edge_mm, print_scale};
 use deltille_core::words::counted;
 
 /// Detections and their target.
@@ -95,7 +95,11 @@ struct Lengths {
 }
 
 fn lengths(text: &str) -> Result<Lengths, String> {
-    let mm = |part: &str| parse_length_mm(part.trim()).map_err(|error| error.to_string());
+    let mm = |part: &str| {
+        let expected =
+            || "expected one length or two, across and up, such as 269.3,199.6".to_owned();
+        parse_length_mm(part.trim()).map_err(|_| expected())
+    };
     Ok(match text.split_once(',') {
         Some((across, up)) => Lengths { across_mm: mm(across)?, up_mm: Some(mm(up)?) },
         None => Lengths { across_mm: mm(text)?, up_mm: None },
@@ -316,6 +320,13 @@ impl SheetArgs {
     }
 }
 
+/// Largest relative error of a print that was not scaled to fit the page; paper and printers stretch by less.
+const USUAL_PRINT: f64 = 0.02;
+
+/// Plausible ratios of a check bar to its nominal length: prints that were scaled to another page are within it, swapped
+/// lengths of bars are not.
+const MEASURED: Range = Range { least: 0.8, most: 1.25, unit: "" };
+
 impl Lengths {
     /// Returns the ratios of these lengths to those of the check bars on the first page, across and up.
     fn scale(self, sheets: &[SheetLayout]) -> anyhow::Result<[f64; 2]> {
@@ -333,13 +344,23 @@ impl Lengths {
                 )
             })?;
             let nominal_mm = bar.length_mm();
-            print_scale::RANGE.check(measured_mm / nominal_mm).map_err(|_| {
+            let ratio = measured_mm / nominal_mm;
+            let ratio = MEASURED.check(ratio).map_err(|_| {
                 anyhow!(
                     "{} is not the length of the {direction} check bar, which is {} long",
                     format_mm(measured_mm),
                     format_mm(nominal_mm)
                 )
-            })
+            })?;
+            if (ratio - 1.0).abs() > USUAL_PRINT {
+                log!(
+                    "warning: --measured: the {direction} check bar is {} instead of {} long; if it was not misread, the print \
+                     was scaled to fit the page",
+                    format_mm(measured_mm),
+                    format_mm(nominal_mm)
+                );
+            }
+            Ok::<_, anyhow::Error>(ratio)
         };
         let across = ratio("horizontal", true, self.across_mm)?;
         let up = self.up_mm.map(|mm| ratio("vertical", false, mm)).transpose()?;

@@ -4,7 +4,7 @@ use crate::values::whole;
 use deltille::limits::Limits;
 
 /// Heading of these options in the help.
-const HEADING: &str = "Input limits";
+pub const HEADING: &str = "Input limits";
 
 /// The limit of text files.
 #[derive(clap::Args)]

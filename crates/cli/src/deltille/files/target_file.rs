@@ -15,6 +15,7 @@ use deltille_core::words::counted;
 
 /// Reads a target with its sheets: `.dsc` files by their extension, JSON otherwise.
 pub fn read(path: &Path, limits: &Limits) -> anyhow::Result<Printing> {
+    let path = &target_file::find(path)?;
     let printing = target_file::read(path, limits)?;
     let corners: usize = printing.target.panels.iter().map(|panel| panel.corners.len()).sum();
     let panels = counted(printing.target.panels.len(), "panel");

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use serde::Serialize;
 
 use super::settings::board_settings::OUTPUT;
@@ -66,6 +66,13 @@ impl Delivery {
 
     /// Returns the file that `-o` names, if its ending is one of these; only its folder remains the output.
     pub fn take_file(&mut self, endings: &[&str]) -> anyhow::Result<Option<NamedFile>> {
+        ensure!(
+            self.output.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("dxf"))
+                || self.output.is_dir(),
+            "-o: {} must be a folder: a DXF has the name of the target; request it with --laser dxf, or with --dxf for the \
+             panels and the net of a solid",
+            self.output.display()
+        );
         let Place { folder, file } = output::place(&self.output, endings)?;
         self.output = folder;
         Ok(file)

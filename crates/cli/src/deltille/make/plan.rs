@@ -83,6 +83,9 @@ fn range(text: &str) -> Result<Distances, String> {
         Err(_) => near.to_owned(),
     };
     let has_unit = !unit.is_empty();
+    if !has_unit && near.parse::<f64>().is_err() {
+        return Err(format!("the second distance has no unit; add one, such as {text}m"));
+    }
     let parsed = distance(&with_unit).and_then(|near| Ok([near, distance(far)?]));
     let mm = parsed.map_err(|why| match has_unit {
         true => why,

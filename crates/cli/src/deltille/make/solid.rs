@@ -15,6 +15,7 @@ use super::settings::template::Template;
 use super::single_panel::page;
 use crate::deltille::files::written::{self, File, bytes_file, text_file};
 use crate::output::say;
+use crate::progress::Spinner;
 use crate::values::{number, whole};
 use deltille::export::artifacts::{self, Making, What};
 use deltille::export::{dsc, solid_mesh};
@@ -174,7 +175,9 @@ fn run_with(
     meshes.check_use(None)?;
     settings.laser.check_use()?;
     let paper = settings.paper()?;
+    let spinner = Spinner::new("fitting the solid to the paper");
     let spec = settings.spec(shape, &paper)?;
+    drop(spinner);
     let family = family_of(&spec)?;
     let name = settings.name.clone().unwrap_or_else(|| spec.shape.name().to_owned());
     // The net to cut is the printed one; the description contains it even if it is not printed.

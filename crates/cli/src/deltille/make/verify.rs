@@ -61,6 +61,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
         given => given.to_vec(),
     };
+    if artifacts.is_empty() && description.extension().is_some_and(|end| end == "dsc") {
+        bail!(
+            "{}: a .dsc does not describe pages or meshes: use the .json of the target, or list other files to verify",
+            description.display()
+        );
+    }
     if artifacts.is_empty() {
         let name = &printing.target.name;
         bail!(

@@ -206,7 +206,13 @@ pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
             {
                 return Ok(Outcome::Skipped);
             }
+            let start = Instant::now();
             let found = one_image(&args, &targets, &finder, frame)?;
+            detail!(
+                "{}: {:.1} ms",
+                name.as_deref().unwrap_or(&stem),
+                1e3 * start.elapsed().as_secs_f64()
+            );
             let looked_at = Seen { index, ink: found.ink };
             seen.lock().expect("no thread panics here").push(looked_at);
             Ok(Outcome::Seen(Box::new(found)))
@@ -324,7 +330,7 @@ fn row_of(name: Option<String>, result: &mut anyhow::Result<Outcome>) -> Option<
 
 /// Prints the results of the images in order, as soon as they are available.
 struct Report {
-    /// Whether images are not reported.
+    /// Whether images that show the target are not reported.
     is_silent: bool,
     /// With a single image, its error is the error of the command.
     single: bool,
@@ -372,7 +378,7 @@ impl Report {
                 Ok(Outcome::Seen(found)) => {
                     state.found += usize::from(found.is_there);
                     // Output that cannot be printed is lost, as with `println`.
-                    if self.is_silent {
+                    if self.is_silent && found.is_there {
                         continue;
                     }
                     if let Err(error) = output::print(&found.line) {
@@ -429,12 +435,13 @@ impl Args {
     /// Separates the folder and the file that `-o` names, and sets the format.
     fn set_place(&mut self, images: &Images) -> anyhow::Result<()> {
         if let Some(output) = &self.output {
-            let endings: Vec<&str> = DETECTION_FORMATS.iter().map(|format| format.name()).collect();
+            let of_one = DETECTION_FORMATS.iter().filter(|format| format.is_of_one_image());
+            let endings: Vec<&str> = of_one.map(|format| format.name()).collect();
             let Place { folder, file } = output::place(output, &endings)?;
             if let Some(NamedFile { stem, ending }) = file {
                 let is_photograph = images.is_single() && images.count().is_some();
                 let named = DETECTION_FORMATS.iter().find(|format| format.name() == ending);
-                let named = named.filter(|format| format.is_of_one_image() && is_photograph);
+                let named = named.filter(|_| is_photograph);
                 let named = named.with_context(|| {
                     format!(
                         "-o: {} must be a folder, because several files are written",
@@ -509,9 +516,7 @@ fn one_image(
     let (place, stem) = (frame.path().to_owned(), frame.stem());
     let (name, time_ns) = (frame.name(), frame.time_ns());
     let Photograph { image, notes } = frame.read(&limits, args.accept_damaged)?;
-    let start = Instant::now();
     let mut found = finder.detect(&image, &name);
-    detail!("{}: detected in {:.1} ms", place.display(), 1e3 * start.elapsed().as_secs_f64());
     (found.file, found.time_ns) = (notes, time_ns);
     let text = |format: &&DetectionFormat| {
         let text = format.text(&found, targets.first())?;

@@ -10,7 +10,7 @@ use image::{DynamicImage, ImageBuffer, Luma};
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::written::{bytes_file, text_file, write_all};
 use crate::deltille::files::{camera_file, target_file};
-use crate::output::{self, Overwrite, log, say};
+use crate::output::{self, Overwrite, log, report};
 use crate::values::number;
 use deltille::camera::{Camera, Pose};
 use deltille::export::kind::signed_png;
@@ -116,7 +116,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let files =
         [text_file(truth_name, truth), bytes_file(name.into_owned(), signed_png(png.into_inner()))];
     write_all(output::folder_of(&path), &files, args.overwrite)?;
-    say!("{}: {} in view", path.display(), counted(seen.len(), "corner"));
+    report!("{}: {} in view", path.display(), counted(seen.len(), "corner"));
     if seen.is_empty() {
         // In the frames of OpenCV's boards, z points into the board.
         let first = target.panels.first();

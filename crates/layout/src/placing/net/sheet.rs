@@ -107,7 +107,7 @@ fn seamed(
     let what = format!("the net of a solid with {} edges", format_mm(spec.edge_mm));
     let count = net.pieces.len();
     let pieces = net.pieces.iter().zip(&net.tabs).enumerate();
-    pieces
+    let sheets: Vec<SheetLayout> = pieces
         .map(|(index, (piece, tabs))| {
             let poster = Poster::new(&points(piece, tabs), paper)?;
             poster.check(&what, SolidEdgeMm, spec.edge_mm, Some(SolidSheetsPerFace), paper)?;
@@ -124,9 +124,18 @@ fn seamed(
             let (tiles, lines) = (tiles.collect(), sheet.lines.clone());
             let words = |at: DVec2, room: f64| instructions(&lines, at, room).to_vec();
             poster.add_pages(&mut sheet, tiles, &lines, &drawing.label(&of), "", words);
-            Ok(sheet)
+            Ok::<_, TargetError>(sheet)
         })
-        .collect()
+        .collect::<Result<_, _>>()?;
+    let pages: usize = sheets.iter().map(SheetLayout::page_count).sum();
+    if let Some(allowed) = paper.pages.filter(|&allowed| pages > allowed as usize) {
+        let problem = format!(
+            "{what} takes {pages} pages, but {allowed} are allowed: allow more, or use a shorter {SolidEdgeMm} or a \
+             larger {PaperSize}"
+        );
+        return Err(TargetError::invalid(PaperPages, problem));
+    }
+    Ok(sheets)
 }
 
 /// Nests pieces of whole faces on pages. They go on the smallest paper that fits all of them on one page, or on the allowed number

@@ -325,7 +325,10 @@ impl BoardSettings {
     /// Parses the settings; numeric ranges are checked when the board is made.
     pub fn plan(&self, grid: GridKind) -> anyhow::Result<Plan> {
         let (Some(rows), Some(cols)) = (self.rows, self.cols) else {
-            bail!("--rows and --cols are needed, as options or in a --template");
+            bail!(
+                "--rows and --cols are needed, as options (such as --rows 10 --cols 11; `deltille plan` proposes them) or in a \
+                 --template"
+            );
         };
         let paper = PaperSpec {
             size: self.paper.as_deref().map(str::parse).transpose().context("--paper")?,

@@ -5,19 +5,19 @@
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, anyhow, bail, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::option_checks::{is_false, length, refuse_idle};
 use crate::deltille::files::written::{File, bytes_file};
 use crate::output::log;
-use crate::values::{Grid, number, whole};
+use crate::values::{number, whole};
 use deltille::export::artifacts::{Making, What, make, of_mesh};
 use deltille::export::inlay::InlaidBodies;
 use deltille::export::mesh::{MAX_TEXTURE_PX, MeshError, Meshing, Resolution, TexturedMesh};
 use deltille::export::texture::MAX_TEXTURES;
 use deltille::export::threemf;
-use deltille::targets::{Target, TargetSpec};
+use deltille::targets::{Target, TargetSpec, parse_length_mm};
 
 /// Heading of these options.
 const MESHES: &str = "Meshes and simulator models";
@@ -68,7 +68,7 @@ pub struct Meshes {
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     inlay: Option<String>,
     /// Width and depth of the printer's bed in mm, for a warning if the 3MF is larger [default: 256x256]
-    #[arg(long, value_name = "WxD")]
+    #[arg(long, value_name = "WxD", allow_hyphen_values = true)]
     bed: Option<String>,
     /// Diameter of the printer's nozzle, for a warning if cells of tags in the 3MF are smaller [default: 0.4mm]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
@@ -216,14 +216,9 @@ impl Meshes {
 
     /// Describes a 3MF in one line, and warns if it may be too large or too fine for the printer.
     fn described(&self, target: &Target, bodies: &InlaidBodies) -> anyhow::Result<String> {
-        let bed: Grid = self
-            .bed
-            .as_deref()
-            .unwrap_or("256x256")
-            .parse()
-            .map_err(|why| anyhow!("--bed: {why}"))?;
-        let bed = bed.0.map(f64::from);
+        let bed = bed_mm(self.bed.as_deref().unwrap_or("256x256"))?;
         let nozzle_mm = length("nozzle", &self.nozzle)?.unwrap_or(0.4);
+        ensure!(nozzle_mm > 0.0, "--nozzle: the diameter must be greater than 0, such as 0.4mm");
         let size = bodies.size_mm();
         let [longest, shortest] = [size.x.max(size.y), size.x.min(size.y)];
         let scale = (bed[0].max(bed[1]) / longest).min(bed[0].min(bed[1]) / shortest);
@@ -273,6 +268,22 @@ impl Meshes {
             self.textured_formats().flat_map(|what| of_mesh(&mesh, what)).collect();
         let files = files.into_iter().map(|(name, bytes)| bytes_file(name, bytes)).collect();
         Ok((files, describe(&mesh)))
+    }
+}
+
+/// Parses the width and depth of a bed, or the side of a square one, mm.
+fn bed_mm(text: &str) -> anyhow::Result<[f64; 2]> {
+    let (width, depth) = text.split_once(['x', '×']).unwrap_or((text, text));
+    // A unit after the second length applies to both.
+    let unit = depth.trim_start_matches(|c: char| !c.is_ascii_alphabetic());
+    let has_unit = width.ends_with(|c: char| c.is_ascii_alphabetic());
+    let width = if has_unit { width.to_owned() } else { format!("{width}{unit}") };
+    let sides = [parse_length_mm(&width), parse_length_mm(depth)];
+    match sides {
+        [Ok(width), Ok(depth)] if width >= 1.0 && depth >= 1.0 => Ok([width, depth]),
+        _ => {
+            bail!("--bed: expected the width and depth of the bed, such as 256x256 (mm) or 10x10in")
+        }
     }
 }
 

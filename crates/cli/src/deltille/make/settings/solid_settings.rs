@@ -48,7 +48,7 @@ pub struct SolidSettings {
     #[serde(skip_serializing_if = "is_false")]
     pub allow_skew: bool,
     /// Edge length of the solid, such as 150mm, 15cm, 6in [default: 150mm, or the largest whole number of millimetres
-    /// whose net fits --paper on --pages]
+    /// whose net fits --paper on --pages; with --allow-seams, only if --pages is given]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     pub edge: Option<String>,
     /// Number of black tiles along each side of a face, 6 to 200 [default: 10]
