@@ -107,14 +107,20 @@ pub(crate) fn panels(
     let vertices = board_vertices(spec.grid, spec.rows, spec.cols);
     let on_each = |spacing| tagged_tiles(spec.grid, &vertices, spacing, tags.tags_in).len() as u64;
     let boards = u64::from(spec.panel_count());
+    let on_one = on_each(tags.spacing);
     let instead = |available: u64| {
-        let wider = wider_spacing(tags, available, |spacing| boards * on_each(spacing));
-        let fewer = available / on_each(tags.spacing).max(1);
+        let tiles = on_each(1);
+        let wider = wider_spacing(tags, available, |spacing| {
+            // The start with the most tags has at least the mean. On large boards, no other spacing needs counting.
+            let least = boards * tiles.div_ceil(u64::from(spacing).pow(2));
+            if least > available { least } else { boards * on_each(spacing) }
+        });
+        let fewer = available / on_one.max(1);
         let fewer =
             (fewer > 0 && spec.boards > 1).then(|| format!("use at most {fewer} {BoardBoards}"));
         wider.into_iter().chain(fewer).collect()
     };
-    let needed = boards * on_each(tags.spacing);
+    let needed = boards * on_one;
     let family =
         check_family(spec.grid, tags, spec.edge_mm, family, needed, TagSettings::TAGS, instead)?;
     Ok((untied_panels(spec), Some(family)))
