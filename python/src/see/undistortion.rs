@@ -348,14 +348,15 @@ impl Rectification {
         format!("<Rectification: baseline {mm:.3} mm, equal {what}>")
     }
 
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> crate::Reduced<'py, (Undistortion, Undistortion, [f64; 3], [[f64; 4]; 4])> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, PairParts> {
         let restore = slf.py().import("deltille._core")?.getattr("_rectification")?;
         let Self { first, second, baseline_mm, depth } = slf.get().clone();
         Ok((restore, (first, second, baseline_mm, depth)))
     }
 }
+
+/// The views of a rectification, its baseline and its depth matrix.
+type PairParts = (Undistortion, Undistortion, [f64; 3], [[f64; 4]; 4]);
 
 /// Restores pickled rectified views.
 #[pyfunction]
