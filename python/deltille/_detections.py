@@ -59,20 +59,20 @@ def to_opencv(
     image_points : list of ndarray of N × 2, float32
         Positions in the image, px.
     """
-    points = [opencv_points(detection) for detection in detections if detection.error is None]
+    points = [opencv_points(detection) for detection in detections if detection]
     points = [(objects, pixels) for objects, pixels in points if len(objects) >= least_corners]
     return [objects for objects, _ in points], [pixels for _, pixels in points]
 
 
 def stereo_to_opencv(
-    left: Sequence[Detection], right: Sequence[Detection], *, least_corners: int = 6
+    left: Sequence[Detection | Failure], right: Sequence[Detection | Failure], *, least_corners: int = 6
 ) -> tuple[list[Points], list[Points], list[Points]]:
     """Returns the corners that two cameras observed at the same times, in the format of ``cv2.stereoCalibrate``.
 
     Parameters
     ----------
     left, right : sequence of Detection
-        Detections at the same times in the same order.
+        Detections at the same times in the same order. A pair with a failure is skipped.
     least_corners : int, optional
         Pairs of images with fewer common corners are skipped.
 
@@ -93,6 +93,8 @@ def stereo_to_opencv(
     lefts: list[Points] = []
     rights: list[Points] = []
     for one, other in zip(left, right):
+        if not one or not other:
+            continue
         ids, own, theirs = numpy.intersect1d(one.ids, other.ids, return_indices=True)
         own, theirs = own[ids >= 0], theirs[ids >= 0]
         places = one.object_points[own]

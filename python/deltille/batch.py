@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Sized
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Optional, Union
+from typing import TYPE_CHECKING, Any, Callable, Literal, Optional, Union
 
 from ._core import Detection, Detector, Frame, Frames, Target, _tables
 from .errors import Error, FileError, ImageError
@@ -39,8 +39,13 @@ class Failure:
         self.image = image
         self.error = error
 
-    def __bool__(self) -> bool:
+    def __bool__(self) -> Literal[False]:
         return False
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Failure):
+            return NotImplemented
+        return (self.image, type(self.error), str(self.error)) == (other.image, type(other.error), str(other.error))
 
     def __len__(self) -> int:
         return 0

@@ -65,9 +65,14 @@ class VerifyError(Error, ValueError):
 class FileError(Error, OSError):
     """A file that cannot be read or written.
 
-    If the operating system reports the reason, ``errno``, ``strerror`` and ``filename`` are set as in every :class:`OSError`.
-    Otherwise they are ``None``, and the message is that of the library.
+    If the operating system reports the reason, ``errno``, ``strerror`` and ``filename`` are set as in every :class:`OSError`;
+    otherwise they are ``None``.
     """
+
+    _text: _Optional[str] = None
+
+    def __str__(self) -> str:
+        return super().__str__() if self._text is None else self._text
 
 
 class MissingFileError(FileError, FileNotFoundError):
@@ -82,8 +87,8 @@ class FolderError(FileError, IsADirectoryError):
     """A folder where a file is needed; ``filename`` is its name."""
 
 
-def _of_system(number: _Optional[int], filename: str) -> FileError:
-    """Returns the exception for an ``errno``; without one, the exception for a folder where a file is needed."""
+def _of_system(number: _Optional[int], filename: str, text: str) -> FileError:
+    """Returns the exception for an ``errno`` with a message; without one, for a folder where a file is needed."""
     plain: _Any
     if number is None:
         plain = OSError(_errno.EISDIR, _os.strerror(_errno.EISDIR))
@@ -95,7 +100,9 @@ def _of_system(number: _Optional[int], filename: str) -> FileError:
         plain = OSError(number, _os.strerror(number))
     kinds: tuple[type[FileError], ...] = (MissingFileError, PermissionFileError, FolderError)
     kind = next((kind for kind in kinds if isinstance(plain, kind.__bases__[1])), FileError)
-    return kind(plain.errno, plain.strerror, filename)
+    error = kind(plain.errno, plain.strerror, filename)
+    error._text = text
+    return error
 
 
 # Show the public module in tracebacks.

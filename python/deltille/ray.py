@@ -24,6 +24,7 @@ import ray.data
 
 import deltille
 from deltille import _recordings
+from deltille._tables import ASKED, CORNERS, IMAGES, Rows, Stamp, Writing, done, files, forget, place, remove_halves
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -34,71 +35,6 @@ if TYPE_CHECKING:
     Targets: TypeAlias = Union["deltille.Target", Sequence["deltille.Target"]]
 
 __all__ = ["CORNERS", "IMAGES", "Summary", "detect", "detect_to", "done"]
-
-#: Metadata key of a table: a hash of the target and the options of its images.
-ASKED = b"deltille.asked"
-
-#: Columns of the table of corners.
-CORNERS = pa.schema(
-    [
-        ("image", pa.string()),
-        ("grid", pa.int32()),
-        ("kind", pa.string()),
-        ("target", pa.string()),
-        ("panel", pa.uint32()),
-        ("mirrored", pa.bool_()),
-        ("row", pa.int32()),
-        ("col", pa.int32()),
-        ("id", pa.uint32()),
-        ("x", pa.float64()),
-        ("y", pa.float64()),
-        ("cov_xx", pa.float64()),
-        ("cov_xy", pa.float64()),
-        ("cov_yy", pa.float64()),
-        ("target_x_mm", pa.float64()),
-        ("target_y_mm", pa.float64()),
-        ("target_z_mm", pa.float64()),
-    ],
-    metadata={"deltille.schema": "deltille/corners/1"},
-)
-
-#: Columns of the table of images.
-IMAGES = pa.schema(
-    [
-        ("image", pa.string()),
-        ("width", pa.int32()),
-        ("height", pa.int32()),
-        ("grids", pa.int32()),
-        ("corners", pa.int32()),
-        ("tags", pa.int32()),
-        ("why", pa.string()),
-        ("why_text", pa.string()),
-        ("reasons", pa.string()),
-        ("tone_black", pa.float64()),
-        ("tone_white", pa.float64()),
-        ("tone_kappa", pa.float64()),
-        ("tone_kappa_sd", pa.float64()),
-        ("tone_kappa_odd", pa.float64()),
-        ("tone_used", pa.bool_()),
-        ("ink_edges", pa.float64()),
-        ("ink_edges_sd", pa.float64()),
-        ("ink_um", pa.float64()),
-        ("ink_um_sd", pa.float64()),
-        ("ink_used", pa.bool_()),
-        ("ink_images", pa.int32()),
-        ("exif_orientation", pa.int32()),
-        ("damage", pa.string()),
-        ("error", pa.string()),
-        ("targets", pa.string()),
-        ("time_ns", pa.int64()),
-        ("camera", pa.string()),
-    ],
-    metadata={"deltille.schema": "deltille/images/1"},
-)
-
-# Columns of a corner nested in the row of its image: all except the name of the image.
-_CORNER = pa.struct(list(CORNERS)[1:])
-_BOTH = pa.schema([*IMAGES, pa.field("found", pa.list_(_CORNER))])
 
 _ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".pnm", ".pbm", ".webp")
 
@@ -189,7 +125,7 @@ def detect(
         raise ValueError(f'unknown per {per} (known: "corner", "image", "both")')
     found: ray.data.Dataset
     reading = _Reading(filesystem, accept_damaged, topic, every)
-    found, _ = _detect(images, frozenset(), target, per, concurrency, batch_size, reading, options)
+    found, _ = _detect(_listed(images, reading.filesystem), frozenset(), target, per, concurrency, batch_size, reading, options)
     return found
 
 
@@ -205,12 +141,14 @@ def detect_to(
     topic: Optional[str] = None,
     every: int = 1,
     images_per_file: int = 1000,
+    retry_errors: bool = False,
     **options: Any,
 ) -> Summary:
     """Detects a target in images and writes results continuously to ``folder/corners`` and ``folder/images``.
 
     Images that already have results in the folder are skipped, even if they have no corners or an error: repeat the same call
-    to resume an interrupted run. ``deltille calibrate FOLDER --target …`` reads the folder.
+    to resume an interrupted run. Images and recordings whose files have another size or modification time since are processed
+    again, except those of a dataset. ``deltille calibrate FOLDER --target …`` reads the folder.
 
     Parameters
     ----------
@@ -220,6 +158,8 @@ def detect_to(
         See :func:`detect`; `filesystem` is that of the images.
     images_per_file : int, optional
         Minimum number of images per file of either table. An interrupted run loses images that are not in a file yet.
+    retry_errors : bool, optional
+        Process images again that could not be read.
 
     Returns
     -------
@@ -232,25 +172,27 @@ def detect_to(
     """
     if images_per_file < 1:
         raise ValueError("images_per_file must be at least 1")
-    to, root = _place(folder)
+    to, root = place(folder)
     of_topic = {} if topic is None else {"topic": topic}
     asked = _asked(target, {**options, **of_topic, "accept_damaged": accept_damaged})
-    for path in _files(to, f"{root}/images")[:1]:
+    for path in files(to, f"{root}/images")[:1]:
         with to.open_input_file(path) as file:
             known = (pq.read_schema(file).metadata or {}).get(ASKED, asked)
         if known != asked:
             what = "the folder contains results for another target or other options; use another folder"
             raise deltille.DetectionError(f"{folder}: {what}")
-    _remove_halves(to, root)
-    there = done(folder)
+    remove_halves(to, root)
     reading = _Reading(filesystem, accept_damaged, topic, every)
-    dataset, skipped = _detect(images, there, target, "both", concurrency, batch_size, reading, options)
+    listed = _listed(images, reading.filesystem)
+    photographs, recordings = ({}, {}) if isinstance(listed, ray.data.Dataset) else listed
+    forget(to, root, photographs, recordings, retry_errors)
+    dataset, skipped = _detect(listed, done(folder), target, "both", concurrency, batch_size, reading, options)
     if dataset is None:
         return Summary(0, 0, 0, skipped)
     # A single process writes all files, because Ray needs a second to start a process. It reserves no processor: the
     # detecting processes occupy all processors, so the writer would never start and they would wait for it forever.
     written = dataset.map_batches(
-        _Writing,
+        Writing,
         batch_size=images_per_file,
         batch_format="pyarrow",
         compute=ray.data.ActorPoolStrategy(size=1),
@@ -262,16 +204,6 @@ def detect_to(
     return Summary(images_seen, corners, errors, skipped)
 
 
-def done(folder: Union[str, "os.PathLike[str]"]) -> frozenset[str]:
-    """Returns the names of the images with results in a folder of :func:`detect_to`."""
-    to, root = _place(folder)
-    names: set[str] = set()
-    for path in _files(to, f"{root}/images"):
-        with to.open_input_file(path) as file:
-            names.update(pq.read_table(file, columns=["image"])["image"].to_pylist())
-    return frozenset(names)
-
-
 def _asked(target: Optional[Targets], options: dict[str, Any]) -> bytes:
     """Returns a hash of the target and the options."""
     targets = [] if target is None else [target] if isinstance(target, deltille.Target) else list(target)
@@ -279,35 +211,8 @@ def _asked(target: Optional[Targets], options: dict[str, Any]) -> bytes:
     return hashlib.sha256(json.dumps(asked).encode()).hexdigest().encode()
 
 
-def _place(path: Union[str, "os.PathLike[str]"]) -> tuple[pafs.FileSystem, str]:
-    """Returns the filesystem of a path, and the path in it."""
-    text = os.fspath(path)
-    if "://" in text:
-        filesystem, inside = pafs.FileSystem.from_uri(text)
-        return filesystem, inside.rstrip("/")
-    # Workers have a different working directory.
-    return pafs.LocalFileSystem(), os.path.abspath(text)
-
-
-def _files(filesystem: pafs.FileSystem, folder: str) -> list[str]:
-    """Returns the tables in a folder."""
-    selector = pafs.FileSelector(folder, allow_not_found=True)
-    found = filesystem.get_file_info(selector)
-    names = [info for info in found if info.is_file and not info.base_name.startswith(".")]
-    return sorted(info.path for info in names if info.base_name.endswith(".parquet"))
-
-
-def _remove_halves(filesystem: pafs.FileSystem, root: str) -> None:
-    """Removes files of corners without a matching file of images."""
-    name = os.path.basename
-    whole = {name(path) for path in _files(filesystem, f"{root}/images")}
-    for path in _files(filesystem, f"{root}/corners"):
-        if name(path) not in whole:
-            filesystem.delete_file(path)
-
-
 def _detect(
-    images: Any,
+    images: Union["ray.data.Dataset", tuple[dict[str, Stamp], dict[str, Stamp]]],
     there: frozenset[str],
     target: Optional[Targets],
     per: str,
@@ -332,11 +237,10 @@ def _detect(
             raise ValueError("images: the dataset has no column path with the names of the images")
         dataset, rows = images, batch_size
     else:
-        paths, recordings = _listed(images, reading.filesystem)
-        left = [path for path in paths if path not in there]
-        skipped = len(paths) - len(left)
+        left = [path for path in images[0] if path not in there]
+        skipped = len(images[0]) - len(left)
         most = processors if concurrency is None else concurrency if isinstance(concurrency, int) else concurrency[1]
-        recordings = [path for path in recordings if path not in there]
+        recordings = [path for path in images[1] if path not in there]
         ranges = _recordings.ranges(recordings, most, reading.every, reading.topic, batch_size)
         if not left and not ranges and per == "both":
             return None, skipped
@@ -392,31 +296,38 @@ def _work(paths: list[str], of: Optional[_recordings.Range] = None) -> pa.Table:
     )
 
 
-def _listed(paths: Paths, filesystem: Any) -> tuple[list[str], list[str]]:
-    """Lists the photographs among paths and in folders, sorted by name within a folder, and the recordings among paths."""
-    listed: list[str] = []
-    recordings: list[str] = []
-    for path in [paths] if isinstance(paths, (str, os.PathLike)) else paths:
+def _listed(
+    images: Union["ray.data.Dataset", Paths], filesystem: Any
+) -> Union["ray.data.Dataset", tuple[dict[str, Stamp], dict[str, Stamp]]]:
+    """Lists the photographs among paths and in folders, sorted by name within a folder, and the recordings among paths.
+
+    A dataset is returned unchanged.
+    """
+    if isinstance(images, ray.data.Dataset):
+        return images
+    listed: dict[str, Stamp] = {}
+    recordings: dict[str, Stamp] = {}
+    for path in [images] if isinstance(images, (str, os.PathLike)) else images:
         text = os.fspath(path)
-        on, inside = (filesystem, text) if filesystem is not None else _place(text)
+        on, inside = (filesystem, text) if filesystem is not None else place(text)
         info = on.get_file_info(inside)
         if info.type == pafs.FileType.NotFound:
             raise FileNotFoundError(f"{text}: no such file or folder")
         is_folder = info.type == pafs.FileType.Directory
         if _recordings.is_recording(text, on, inside, is_folder):
-            recordings.append(_recordings.local(text, on, inside))
+            recordings[_recordings.local(text, on, inside)] = Stamp.of(info)
             continue
         if not is_folder:
-            listed.append(text)
+            listed[text] = Stamp.of(info)
             continue
         found = on.get_file_info(pafs.FileSelector(inside, recursive=True))
         inner = sorted(
-            file.path[len(inside) :].lstrip("/")
+            (file.path[len(inside) :].lstrip("/"), Stamp.of(file))
             for file in found
             if file.is_file and file.path.lower().endswith(_ENDINGS) and not file.path.endswith(".overlay.jpg")
         )
-        listed.extend(f"{text.rstrip('/')}/{name}" for name in inner)
-    return list(dict.fromkeys(listed)), list(dict.fromkeys(recordings))
+        listed |= {f"{text.rstrip('/')}/{name}": stamp for name, stamp in inner}
+    return listed, recordings
 
 
 class _Looking:
@@ -451,21 +362,22 @@ class _Looking:
 
     def _frames(self, of: _recordings.Range) -> Iterator[pa.Table]:
         """Detects targets in a range of a recording; yields tables so that little is lost if the run is interrupted."""
-        rows = _Rows()
+        rows = Rows()
+        stamp = Stamp.of(pafs.LocalFileSystem().get_file_info(of.path))
         try:
             reading = self.reading
             for name, frame in _recordings.frames(of, reading.topic, reading.every, reading.accept_damaged):
                 if name not in self.there:
-                    self._add(rows, name, lambda: self.detector.detect(frame, name=name))
+                    self._add(rows, name, stamp, lambda: self.detector.detect(frame, name=name))
                 if len(rows.images) == self.images_per_table:
                     yield rows.table(self.per)
-                    rows = _Rows()
+                    rows = Rows()
         except (deltille.Error, OSError, ValueError) as error:
-            rows.failed(of.path, f"{error}")
+            rows.failed(of.path, f"{error}", stamp)
         yield rows.table(self.per)
 
     def _photographs(self, batch: pa.Table) -> pa.Table:
-        rows = _Rows()
+        rows = Rows()
         names = batch.column_names
         content = batch["bytes"] if "bytes" in names else [None] * len(batch)
         for path, encoded in zip(batch["path"], content):
@@ -473,181 +385,35 @@ class _Looking:
             name = path.as_py()
             if name in self.there:
                 continue
-            self._add(rows, name, lambda: self._detected(name, encoded))
+            stamp = self._stamp(name) if encoded is None else Stamp()
+            self._add(rows, name, stamp, lambda: self._detected(name, encoded))
         return rows.table(self.per)
 
     def _detected(self, name: str, encoded: Any) -> "deltille.Detection":
         data = self._read(name) if encoded is None else encoded.as_buffer()
         return self.detector.detect_bytes(data, name=name, accept_damaged=self.reading.accept_damaged)
 
-    def _add(self, rows: "_Rows", name: str, detect: Callable[[], "deltille.Detection"]) -> None:
+    def _add(self, rows: Rows, name: str, stamp: Stamp, detect: Callable[[], "deltille.Detection"]) -> None:
         try:
             found = detect()
         except (deltille.Error, OSError, ValueError) as error:
-            rows.failed(name, f"{error}")
+            rows.failed(name, f"{error}", stamp)
         else:
-            rows.add(name, found)
+            rows.add(name, found, stamp)
+
+    def _place(self, path: str) -> Any:
+        filesystem = self.reading.filesystem
+        return (filesystem, path) if filesystem is not None else place(path)
+
+    def _stamp(self, path: str) -> Stamp:
+        """Returns the stamp of a file before it is read, so that a later change is noticed."""
+        on, inside = self._place(path)
+        try:
+            return Stamp.of(on.get_file_info(inside))
+        except OSError:
+            return Stamp()
 
     def _read(self, path: str) -> Any:
-        filesystem = self.reading.filesystem
-        on, inside = (filesystem, path) if filesystem is not None else _place(path)
+        on, inside = self._place(path)
         with on.open_input_stream(inside) as file:
             return file.read()
-
-
-class _Rows:
-    """Rows of both tables, column by column."""
-
-    def __init__(self) -> None:
-        self.images: list[dict[str, Any]] = []
-        self.counts: list[int] = []
-        self.corners: list[pa.Table] = []
-
-    def failed(self, image: str, error: str) -> None:
-        self.images.append({"image": image, "error": error})
-        self.counts.append(0)
-
-    def add(self, image: str, found: "deltille.Detection") -> None:
-        reasons = [
-            {"kind": reason.kind}
-            | ({} if reason.grid is None else {"grid": reason.grid})
-            | ({"figures": reason.figures} if reason.figures else {})
-            for reason in found.reasons
-        ]
-        picture: dict[str, Any] = {
-            "image": image,
-            "width": found.width,
-            "height": found.height,
-            "grids": len(found.grids),
-            "corners": len(found),
-            "tags": len(found.tags),
-            "exif_orientation": found.exif_orientation,
-            "damage": found.damage,
-            "time_ns": found.time_ns,
-        }
-        if found.target_identities:
-            picture["targets"] = json.dumps(found.target_identities)
-        if found.camera is not None:
-            picture["camera"] = json.dumps(found.camera)
-        if reasons:
-            picture["why"] = reasons[0]["kind"]
-            picture["why_text"] = "; ".join(str(reason) for reason in found.reasons)
-            picture["reasons"] = json.dumps(reasons)
-        for name, estimate in (("tone", found.tone), ("ink", found.ink)):
-            if estimate is not None:
-                fields = (field for field in IMAGES.names if field.startswith(f"{name}_"))
-                picture |= {field: _field(estimate, field.removeprefix(f"{name}_")) for field in fields}
-        self.images.append(picture)
-        self.counts.append(len(found))
-        if len(found):
-            self.corners.append(_corners(image, found))
-
-    def table(self, per: str) -> pa.Table:
-        corners = pa.concat_tables([CORNERS.empty_table(), *self.corners])
-        if per == "corner":
-            return corners
-        images = pa.Table.from_pylist(self.images, IMAGES)
-        if per == "image":
-            return images
-        parts = corners.drop_columns(["image"]).combine_chunks()
-        arrays = [parts[name].combine_chunks() for name in parts.column_names]
-        values = pa.StructArray.from_arrays(arrays, fields=list(_CORNER))
-        ends = [0]
-        for count in self.counts:
-            ends.append(ends[-1] + count)
-        found = pa.ListArray.from_arrays(pa.array(ends, pa.int32()), values)
-        return pa.table([*images.columns, found], schema=_BOTH)
-
-
-def _field(record: Any, name: str) -> Any:
-    return record.get(name) if isinstance(record, dict) else getattr(record, name, None)
-
-
-def _corners(image: str, found: "deltille.Detection") -> pa.Table:
-    """Makes the table of corners of an image."""
-    grids = found.grid_indices
-    each = found.grids
-    cov, pixels, places = found.covariances, found.pixels, found.object_points
-
-    def of_grid(what: Any) -> list[Any]:
-        values = [what(grid) for grid in each]
-        return [values[grid] for grid in grids]
-
-    def known(ids: Any) -> pa.Array:
-        return pa.array(ids, mask=ids < 0).cast(pa.uint32())
-
-    def number(values: Any) -> pa.Array:
-        # NaN stands for unknown numbers.
-        return pa.array(values, pa.float64(), from_pandas=True)
-
-    columns = {
-        "image": [image] * len(grids),
-        "grid": grids,
-        "kind": of_grid(lambda grid: grid.kind),
-        "target": of_grid(lambda grid: grid.target),
-        "panel": known(found.panels),
-        "mirrored": of_grid(lambda grid: grid.mirrored),
-        "row": found.rows,
-        "col": found.cols,
-        "id": known(found.ids),
-        "x": number(pixels[:, 0]),
-        "y": number(pixels[:, 1]),
-        "cov_xx": number(cov[:, 0, 0]),
-        "cov_xy": number(cov[:, 0, 1]),
-        "cov_yy": number(cov[:, 1, 1]),
-        "target_x_mm": number(places[:, 0]),
-        "target_y_mm": number(places[:, 1]),
-        "target_z_mm": number(places[:, 2]),
-    }
-    arrays = [
-        values.cast(field.type) if isinstance(values, pa.Array) else pa.array(values, field.type)
-        for field, values in zip(CORNERS, columns.values())
-    ]
-    return pa.table(arrays, schema=CORNERS)
-
-
-class _Writing:
-    """A process that writes rows of images as a file of corners and then a file of images, with the same name.
-
-    An image counts as done once it is in a file of images. Readers ignore a file of corners without a file of images, and the
-    next run removes it.
-    """
-
-    def __init__(self, filesystem: pafs.FileSystem, root: str, run: str, asked: bytes) -> None:
-        self.filesystem = filesystem
-        self.root = root
-        self.run = run
-        self.asked = asked
-        for table in ("corners", "images"):
-            self.filesystem.create_dir(f"{root}/{table}", recursive=True)
-
-    def __call__(self, both: pa.Table) -> pa.Table:
-        if not len(both):
-            return pa.table({"images": [0], "corners": [0], "errors": [0]})
-        both = both.combine_chunks()
-        images = both.select(IMAGES.names).cast(IMAGES)
-        images = images.replace_schema_metadata({**(IMAGES.metadata or {}), ASKED: self.asked})
-        lists = both["found"].combine_chunks()
-        values = lists.flatten()
-        image = images["image"].combine_chunks().take(pa.compute.list_parent_indices(lists))
-        columns = [image, *(values.field(field.name) for field in list(CORNERS)[1:])]
-        corners = pa.table(columns, schema=CORNERS)
-        # Work repeated after a lost process writes the same files again.
-        of_these = hashlib.sha256("\n".join(images["image"].to_pylist()).encode()).hexdigest()
-        name = f"{self.run}-{of_these[:16]}.parquet"
-        self._put(corners, f"{self.root}/corners", name)
-        self._put(images, f"{self.root}/images", name)
-        errors = len(images) - images["error"].null_count
-        return pa.table({"images": [len(images)], "corners": [len(corners)], "errors": [errors]})
-
-    def _put(self, table: pa.Table, folder: str, name: str) -> None:
-        """Writes a file atomically."""
-        if not isinstance(self.filesystem, pafs.LocalFileSystem):
-            # An object in a bucket appears when its stream is closed.
-            with self.filesystem.open_output_stream(f"{folder}/{name}") as file:
-                pq.write_table(table, file, compression="snappy")
-            return
-        temporary = f"{folder}/.{name}-{uuid.uuid4().hex}"
-        with self.filesystem.open_output_stream(temporary) as file:
-            pq.write_table(table, file, compression="snappy")
-        os.replace(temporary, f"{folder}/{name}")

@@ -91,6 +91,10 @@ mod _core {
     #[pymodule_export]
     use super::see::tracker::Tracker;
     #[pymodule_export]
+    use super::see::undistortion::{
+        _rectification, _undistortion, Rectification, Undistortion, rectify, undistort,
+    };
+    #[pymodule_export]
     use super::targets::boards::{Board, Checkerboard};
     #[pymodule_export]
     use super::targets::families::{Family, search_family};

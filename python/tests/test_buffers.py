@@ -100,11 +100,11 @@ def test_every_layout_of_colours_gives_the_same_corners(detector, colours, order
     assert (found.pixels == expected.pixels).all() and (found.covariances == expected.covariances).all()
 
 
-@pytest.mark.parametrize("dtype", ["uint8", "uint16", "float32"])
+@pytest.mark.parametrize("dtype", ["uint8", "uint16", "float32", "float64"])
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 @pytest.mark.parametrize("steps", [(-1, 1), (1, -1), (1, 2), (-2, -3)])
 def test_every_layout_of_grey_values_gives_the_same_corners(detector, picture, dtype, order, steps):
-    full_scale = {"uint8": 1, "uint16": 257, "float32": 1 / 255}[dtype]
+    full_scale = {"uint8": 1, "uint16": 257, "float32": 1 / 255, "float64": 1 / 255}[dtype]
     grey = (picture.astype(float) * full_scale).astype(dtype)
     expected, found = detector.detect(grey), detector.detect(laid_out(grey, order, steps))
     assert len(expected) > 50
@@ -152,7 +152,7 @@ WRONG = {
     "signed": numpy.zeros((480, 640), numpy.int8),
     "int64": numpy.zeros((480, 640), numpy.int64),
     "bool": numpy.zeros((480, 640), bool),
-    "float64": numpy.zeros((480, 640)),
+    "float64 to 255": numpy.full((480, 640), 255.0),
     "float16": numpy.zeros((480, 640), numpy.float16),
     "float colours": numpy.zeros((480, 640, 3), numpy.float32),
     "floats to 255": numpy.full((480, 640), 255, numpy.float32),

@@ -85,7 +85,7 @@ def test_file_errors_have_errno_and_survive_pickling(tmp_path):
             for error in [found, pickle.loads(pickle.dumps(found)), copy.copy(found), copy.deepcopy(found)]:
                 assert type(error) is kind and isinstance(error, deltille.FileError)
                 assert (error.errno, error.strerror, error.filename) == (number, os.strerror(number), str(path)), read
-                assert str(error) == f"[Errno {number}] {os.strerror(number)}: {str(path)!r}"
+                assert str(path) in str(error) and "Errno" not in str(error) and "os error" not in str(error)
     # Errors without an errno have the message of the library.
     words = deltille.FileError("a.csv: names two formats")
     assert str(pickle.loads(pickle.dumps(words))) == "a.csv: names two formats" and words.errno is None

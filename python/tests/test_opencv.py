@@ -66,6 +66,40 @@ def test_fisheyes_agree_with_opencv():
     numpy.testing.assert_allclose(camera.project(points), theirs[:, 0], atol=1e-9)
 
 
+@pytest.mark.parametrize("count", [4, 5, 8, 12, 14])
+def test_cameras_from_opencv(count, calibration):
+    matrix = numpy.array([[900, 0, 630], [0, 910, 470], [0, 0, 1.0]])
+    distortion = numpy.array([0.1, 0.02, 0.001, -0.002, 0.01, 0.3, 0.05, 0.01, 1e-3, 2e-3, -1e-3, 5e-4, 0, 0])[:count]
+    # OpenCV returns rows or columns, depending on its version.
+    for shape in [(count,), (1, count), (count, 1)]:
+        camera = deltille.Camera.from_opencv(matrix, distortion.reshape(shape), (1280, 960))
+        numpy.testing.assert_array_equal(camera.K, matrix)
+        numpy.testing.assert_array_equal(camera.dist, distortion[:12])
+    assert deltille.Camera.from_opencv(matrix, None, (1280, 960)).model == "pinhole"
+    wide = deltille.Camera.from_opencv(matrix, [0.01, -0.02, 0.003, -1e-4], (1280, 960), fisheye=True)
+    assert wide.model == "fisheye" and list(wide.dist) == [0.01, -0.02, 0.003, -1e-4]
+    tilted = [*distortion[:12], *[0] * (13 - len(distortion[:12])), 0.1]
+    for wrong, words in [(([[1, 2], [3, 4]], None, (4, 4)), "matrix"), ((numpy.ones((3, 3)), None, (4, 4)), "matrix: expected fx"),
+                         ((matrix, [1, 2, 3], (4, 4)), "4, 5, 8, 12, 14 coefficients"), ((matrix, tilted, (4, 4)), "tilted")]:
+        with pytest.raises(deltille.Error, match=words):
+            deltille.Camera.from_opencv(*wrong)
+
+
+def test_poses_of_views_are_those_of_opencv(detections, board):
+    ours = deltille.calibrate(detections, board, weights="equal", loss="none")
+    size = (ours.camera.width, ours.camera.height)
+    *_, rvecs, tvecs = cv2.calibrateCamera(*deltille.to_opencv(detections), size, None, None, flags=cv2.CALIB_FIX_K3)
+    numpy.testing.assert_allclose(ours.tvecs, numpy.reshape(tvecs, (-1, 3)), atol=0.3)
+    numpy.testing.assert_allclose(ours.rvecs, numpy.reshape(rvecs, (-1, 3)), atol=3e-3)
+
+
+def test_failures_are_skipped(detections):
+    broken = deltille.Failure("a.png", deltille.ImageError("a.png: broken"))
+    assert len(deltille.to_opencv([broken, *detections])[0]) == len(detections)
+    points = deltille.stereo_to_opencv([broken, *detections[:3]], [detections[0], broken, *detections[1:3]])
+    assert [len(of_pair) for of_pair in points] == [2, 2, 2]
+
+
 def test_opencv_reads_our_camera_files(calibration, tmp_path):
     path = calibration.save(tmp_path / "a.yaml", "opencv")
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)

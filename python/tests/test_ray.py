@@ -131,6 +131,30 @@ def test_written_results_are_skipped_and_can_be_calibrated(shots, target, tmp_pa
     assert cameras[0] == cameras[1]
 
 
+def test_errors_and_changed_files_are_processed_again(shots, video, target, tmp_path):
+    folder, found = tmp_path / "shots", tmp_path / "found"
+    shutil.copytree(shots / "b", folder)
+    recording = Path(shutil.copy(video, folder / "run.y4m"))
+    run = lambda **options: deltille.ray.detect_to(found, [folder, recording], target, images_per_file=2, **options)
+    assert run().images == 12
+    shutil.copy(folder / "6.png", folder / "broken.png")
+    shutil.copy(folder / "5.png", folder / "8.png")
+    (folder / "extra.png").write_bytes(b"no image")
+    again = run()
+    assert (again.images, again.errors, again.skipped) == (3, 1, 3)
+    os.utime(recording, (1, 1))
+    retried = run(retry_errors=True)
+    assert (retried.images, retried.errors, retried.skipped) == (1 + 7, 1, 5)
+    assert run().images == 0
+    images = pq.read_table(found / "images")["image"].to_pylist()
+    assert len(images) == len(set(images)) == 13 and deltille.ray.done(found) == set(images)
+    corners = places(pq.read_table(found / "corners").to_pylist())
+    assert len(corners) == pq.read_table(found / "corners").num_rows
+    assert {key: place for key, place in corners.items() if ".png" in key[0]} == expected(folder, target) | {
+        (f"{folder}/broken.png", number): place for (path, number), place in corners.items() if path.endswith("/6.png")
+    }
+
+
 def test_filesystems(shots, target):
     inside = pafs.SubTreeFileSystem(f"{shots}", pafs.LocalFileSystem())
     pictures = deltille.ray.detect("a", target, per="image", filesystem=inside).take_all()

@@ -60,6 +60,7 @@ def test_other_threads_run_during_detection(board):
 
 
 LONG = {
+    "save": "deltille.Board(40, 46, edge_mm=15, tags=False, paper='A0').save('out', ['png'], dpi=600)",
     "search": "deltille.search_family('d36h9', seconds=100)",
     "calibrate": "deltille.calibrate(detections * 1, model='spline', measure_target=True)",
     "detect_many": "deltille.detect_many([picture] * 2000, board, workers=2)",
@@ -93,7 +94,7 @@ except KeyboardInterrupt:
 @pytest.mark.parametrize("what", LONG)
 def test_ctrl_c_ends_long_work(what, tmp_path):
     code = SETUP.format(work=LONG[what], calibrates=what == "calibrate")
-    process = started([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = started([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
     assert process.stdout.readline() == "ready\n"
     time.sleep(0.4)
     start = time.monotonic()

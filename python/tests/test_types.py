@@ -28,9 +28,12 @@ if found.why is not None:
     print(found.why.kind, found.why.sentence)
 results = deltille.detect_many(["a.png", "b.png"], board, workers=2)
 detections: list[deltille.Detection] = [result for result in results if isinstance(result, deltille.Detection)]
+seen: list[deltille.Detection] = [result for result in results if result]
 for result in results:
     if result.error is not None:
         print(result.image, result.error)
+view: deltille.Undistortion = deltille.undistort(deltille.Camera.from_opencv(numpy.eye(3), None, (640, 480)))
+flat: NDArray[numpy.uint8] = view.apply(image)
 calibration: deltille.Calibration = deltille.calibrate(detections, board, "radtan", hold_out=5)
 matrix: NDArray[numpy.float64] = calibration.camera.matrix
 objects, points = deltille.to_opencv(detections)

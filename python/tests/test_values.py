@@ -11,7 +11,7 @@ import deltille
 
 def again(value):
     for made in (copy.copy(value), copy.deepcopy(value), pickle.loads(pickle.dumps(value))):
-        assert type(made) is type(value)
+        assert type(made) is type(value) and made == value
     return pickle.loads(pickle.dumps(value))
 
 
@@ -87,3 +87,32 @@ def test_truth_is_read_back(board, camera, tmp_path):
     for made in [again(truth), deltille.Truth.load(path)]:
         assert (made.pixels == truth.pixels).all() and (made.object_points == truth.object_points).all()
         numpy.testing.assert_allclose(made.pose.matrix, truth.pose.matrix, atol=1e-12)
+
+
+def test_loaded_values_equal_those_that_were_saved(calibration, rig, detections, board, camera, tmp_path):
+    for target in [board, deltille.Charuco((5, 7)), deltille.AprilGrid((4, 4)), deltille.Circles((4, 11)), deltille.Cuboid((80, 60, 50)),
+                   deltille.Board(4, 5, boards=2, note="Lab", mirrored=True), deltille.Board(5, 7, family="dense9")]:
+        assert deltille.Target.load(target.save(tmp_path / f"{len(target)}", formats=[])[0]) == target
+    assert deltille.Detection.load(detections[0].save(tmp_path / "found.json")) == detections[0] != detections[1]
+    for of in [camera, deltille.Camera(640, 480, 300.1, model="fisheye", distortion=[0.1, 0.01, 1 / 3, 1e-9]), calibration.camera]:
+        assert deltille.Camera.load(of.save(tmp_path / "camera.yaml")) == of
+    for residuals in (False, True):
+        made = deltille.Calibration.load(calibration.save(tmp_path / f"{residuals}.json", residuals=residuals), target=board)
+        assert made == calibration
+        assert deltille.Rig.load(rig.save(tmp_path / f"rig-{residuals}.json", residuals=residuals), target=board) == rig
+    family = deltille.Family.load("d16h5")
+    assert deltille.Family.load(family.save(tmp_path / "family.json")) == family
+
+
+def test_results_are_compared_by_their_content(calibration, detections, board, camera):
+    def twice(make):
+        one, other = make(), make()
+        assert one == other and one != "another"
+        return one
+
+    twice(lambda: detections[0].grids[0]), twice(lambda: calibration.views[0]), twice(board.verify)
+    twice(lambda: deltille.next_view(detections)), twice(lambda: deltille.check(calibration, detections[:3]))
+    assert twice(lambda: deltille.pose(detections[0], camera)) != deltille.pose(detections[1], camera)
+    assert twice(lambda: deltille.compare(calibration, camera)) != deltille.compare(camera, calibration)
+    twice(lambda: calibration.joint_covariance), twice(lambda: deltille.Failure("a", deltille.ImageError("b")))
+    assert calibration.views[0] != calibration.views[1]

@@ -35,8 +35,48 @@ pub fn remapped(image: &DynamicImage, map: &PixelMap) -> DynamicImage {
     }
 }
 
-/// A channel of 8 or 16 bits.
-trait Depth: Copy + Default + Send + Sync {
+/// Values of pixels, row by row.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug)]
+pub struct Pixels<'a, T> {
+    values: &'a [T],
+    width: usize,
+    channels: usize,
+}
+
+impl<'a, T: Depth> Pixels<'a, T> {
+    /// Takes the values of an image with the given width, px, and number of channels, 1 to 4; `None` if they do not fill
+    /// whole rows, or if there are none.
+    pub fn new(values: &'a [T], width: usize, channels: usize) -> Option<Self> {
+        let row = width.checked_mul(channels).filter(|row| *row > 0)?;
+        let is_whole = !values.is_empty() && values.len().is_multiple_of(row);
+        (is_whole && channels <= MAX_CHANNELS).then_some(Self { values, width, channels })
+    }
+
+    fn height(&self) -> usize {
+        self.values.len() / (self.width * self.channels)
+    }
+
+    /// Resamples the image as [`remapped`] does. Floating-point values are interpolated in single precision.
+    pub fn remapped(self, map: &PixelMap) -> Vec<T> {
+        let mut pixels = vec![T::default(); map.width() * map.height() * self.channels];
+        let rows = pixels.par_chunks_mut((map.width() * self.channels).max(1)).enumerate();
+        rows.for_each(|(row, pixels)| {
+            for (column, pixel) in pixels.chunks_mut(self.channels).enumerate() {
+                let Some(light) = seen(self, map, [column, row]) else { continue };
+                for (channel, light) in pixel.iter_mut().zip(light) {
+                    *channel = Depth::of_light(light);
+                }
+            }
+        });
+        pixels
+    }
+}
+
+/// The type of a channel.
+#[doc(hidden)]
+pub trait Depth: Copy + Default + Send + Sync {
+    /// The value in single precision.
     fn light(self) -> f32;
 
     /// The nearest representable value.
@@ -64,39 +104,47 @@ impl Depth for u16 {
     }
 }
 
+impl Depth for f32 {
+    fn light(self) -> f32 {
+        self
+    }
+
+    fn of_light(light: f32) -> Self {
+        light
+    }
+}
+
+impl Depth for f64 {
+    fn light(self) -> f32 {
+        self as f32
+    }
+
+    fn of_light(light: f32) -> Self {
+        f64::from(light)
+    }
+}
+
 type Buffer<P> = ImageBuffer<P, Vec<<P as Pixel>::Subpixel>>;
 
 fn of<P>(image: &Buffer<P>, map: &PixelMap) -> Buffer<P>
 where
-    P: Pixel + Sync,
+    P: Pixel,
     P::Subpixel: Depth,
 {
     let channels = usize::from(P::CHANNEL_COUNT);
-    let mut pixels = vec![P::Subpixel::default(); map.width() * map.height() * channels];
-    let rows = pixels.par_chunks_mut(map.width() * channels).enumerate();
-    rows.for_each(|(row, pixels)| {
-        for (column, pixel) in pixels.chunks_mut(channels).enumerate() {
-            let Some(light) = seen(image, map, [column, row]) else { continue };
-            for (channel, light) in pixel.iter_mut().zip(light) {
-                *channel = Depth::of_light(light);
-            }
-        }
-    });
+    let pixels = Pixels { values: image.as_raw(), width: image.width() as usize, channels };
+    let pixels = pixels.remapped(map);
     let [width, height] = [map.width(), map.height()].map(|side| side as u32);
     ImageBuffer::from_raw(width, height, pixels)
         .expect("the buffer has one value per pixel and channel")
 }
 
 /// The mean of the source over a pixel of the result, for each channel; `None` if the pixel has no position.
-fn seen<P>(
-    image: &Buffer<P>,
+fn seen<T: Depth>(
+    image: Pixels<'_, T>,
     map: &PixelMap,
     [column, row]: [usize; 2],
-) -> Option<[f32; MAX_CHANNELS]>
-where
-    P: Pixel,
-    P::Subpixel: Depth,
-{
+) -> Option<[f32; MAX_CHANNELS]> {
     let place = |x: usize, y: usize| map.positions()[y * map.width() + x];
     let here = place(column, row);
     if here[0].is_nan() {
@@ -136,21 +184,19 @@ fn weights(part: f32) -> [f32; 4] {
 }
 
 /// The interpolated value at a position in an image, px; beyond the border the outermost pixels are repeated.
-fn cubic<P>(image: &Buffer<P>, [x, y]: [f32; 2]) -> [f32; MAX_CHANNELS]
-where
-    P: Pixel,
-    P::Subpixel: Depth,
-{
+fn cubic<T: Depth>(image: Pixels<'_, T>, [x, y]: [f32; 2]) -> [f32; MAX_CHANNELS] {
     let (by_column, by_row) = (weights(x - x.floor()), weights(y - y.floor()));
-    let near = |at: f32, step: usize, side: u32| {
-        (at.floor() as i64 + step as i64 - 1).clamp(0, i64::from(side) - 1) as u32
+    let near = |at: f32, step: usize, side: usize| {
+        (at.floor() as i64 + step as i64 - 1).clamp(0, side as i64 - 1) as usize
     };
-    let columns: [u32; 4] = std::array::from_fn(|j| near(x, j, image.width()));
+    let columns: [usize; 4] = std::array::from_fn(|j| near(x, j, image.width));
+    let height = image.height();
     let mut sum = [0.0; MAX_CHANNELS];
     for (i, by_row) in by_row.into_iter().enumerate() {
-        let row = near(y, i, image.height());
+        let row = near(y, i, height);
         for (column, by_column) in columns.into_iter().zip(by_column) {
-            let pixel = image.get_pixel(column, row).channels();
+            let at = (row * image.width + column) * image.channels;
+            let pixel = &image.values[at..at + image.channels];
             for (sum, channel) in sum.iter_mut().zip(pixel) {
                 *sum += by_row * by_column * channel.light();
             }

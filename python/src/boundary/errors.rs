@@ -197,7 +197,7 @@ classes! {
 /// Converts errors of a file to exceptions.
 pub trait RaiseFile<T> {
     /// Converts an error to an exception of class `class` with its message. If the operating system refused access, it is
-    /// a `FileError` with `errno`, `strerror` and `filename`: `MissingFileError` for a missing file,
+    /// a `FileError` with also `errno`, `strerror` and `filename`: `MissingFileError` for a missing file,
     /// `PermissionFileError` for missing permissions, `FolderError` for a folder instead of a file.
     ///
     /// # Errors
@@ -224,7 +224,7 @@ impl<T, E: Error + 'static> RaiseFile<T> for Result<T, E> {
             let refused = limits::check_file(at).err().filter(|_| number.is_none() && at.is_dir());
             let is_folder = refused.is_some_and(|refused| words.contains(&one_line(&refused)));
             match number.is_some() || is_folder {
-                true => of_system(number, at).unwrap_or_else(|wrong| wrong),
+                true => of_system(number, at, &words).unwrap_or_else(|wrong| wrong),
                 false => class(words),
             }
         })
@@ -232,10 +232,12 @@ impl<T, E: Error + 'static> RaiseFile<T> for Result<T, E> {
 }
 
 /// Returns the exception for an `errno`; without one, for a folder where a file is needed.
-fn of_system(number: Option<i32>, path: &Path) -> PyResult<PyErr> {
+fn of_system(number: Option<i32>, path: &Path, words: &str) -> PyResult<PyErr> {
+    let code = number.map_or(String::new(), |number| format!(" (os error {number})"));
     Python::attach(|py| {
         let make = py.import("deltille.errors")?.getattr("_of_system")?;
-        Ok(PyErr::from_value(make.call1((number, path.as_os_str()))?))
+        let words = words.replace(&code, "");
+        Ok(PyErr::from_value(make.call1((number, path.as_os_str(), words))?))
     })
 }
 

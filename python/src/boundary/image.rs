@@ -1,7 +1,7 @@
 //! Converts arrays to images, without a copy if their layout allows.
 
 use deltille::limits::Limits;
-use deltille::raster::{Colours, Gray, ImageView, Intensity, View};
+use deltille::raster::{AnyGray, Colours, Gray, ImageView, Intensity, View};
 use numpy::ndarray::{ArrayView, ArrayView2, ArrayView3, ArrayViewMut2, Axis, Dimension};
 use numpy::{
     Element, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray2,
@@ -29,7 +29,7 @@ pub enum Picture<'py> {
 }
 
 /// The supported arrays, as part of messages.
-const WANTED: &str = "expected an image of H × W with dtype uint8, uint16 or float32 (0 to 1), or of H × W × 3 with dtype uint8 (RGB)";
+const WANTED: &str = "expected an image of H × W with dtype uint8, uint16, float32 or float64 (0 to 1), or of H × W × 3 with dtype uint8 (RGB)";
 
 impl<'py> Picture<'py> {
     /// Reads an image from an array with any strides.
@@ -80,6 +80,7 @@ impl<'py> Picture<'py> {
                 Ok(picture)
             }
             (b'u', 2) | (b'f', 4) => Self::of(&native()?, limits),
+            (b'f', 8) => Self::of(&array.call_method1("astype", (dtype::<f32>(py),))?, limits),
             _ => Err(refused(format!("unsupported dtype {kind}"))),
         }
     }
@@ -125,6 +126,21 @@ impl<'py> Picture<'py> {
         self.view().ok_or_else(|| raised::ImageError::new_err(unsupported))
     }
 
+    /// Returns a copy of the grey values, those of floats with 16 bits.
+    ///
+    /// # Errors
+    /// See [`viewed`](Self::viewed).
+    pub fn grey_values(&self) -> PyResult<AnyGray> {
+        Ok(match self.viewed()? {
+            ImageView::U8(image) => AnyGray::U8(mapped(image, |value| value)),
+            ImageView::U16(image) => AnyGray::U16(mapped(image, |value| value)),
+            ImageView::F32(image) => {
+                AnyGray::U16(mapped(image, |value| (value * 65535.0 + 0.5) as u16))
+            }
+            _ => return Err(errors::image("the values of the image are not grey".to_owned())),
+        })
+    }
+
     fn view(&self) -> Option<ImageView<'_>> {
         Some(match self {
             Self::U8(pixels) => rows(&pixels.as_array())?.into(),
@@ -135,6 +151,18 @@ impl<'py> Picture<'py> {
             Self::Float(pixels) => pixels.into(),
         })
     }
+}
+
+/// Returns an image with every value converted.
+fn mapped<T: Intensity, U: Intensity>(image: View<'_, T>, convert: impl Fn(T) -> U) -> Gray<U> {
+    let mut copy = Gray::new(image.width(), image.height());
+    let rows = copy.pixels_mut().chunks_mut(image.width());
+    for (y, row) in rows.enumerate() {
+        for (to, &from) in row.iter_mut().zip(image.row(y)) {
+            *to = convert(from);
+        }
+    }
+    copy
 }
 
 /// Width of the blocks of a copy, px: in a transposed array, as many rows share the same cache lines.

@@ -9,10 +9,11 @@ use pyo3::prelude::*;
 use super::checking::{OfBoard, new_views};
 use crate::boundary::arrays::column;
 use crate::boundary::errors::{raised, unlocked};
-use crate::see::detection::Targets;
+use crate::see::arguments::Targets;
 
 /// The errors of measured lengths, with their uncertainties.
-#[pyclass(frozen, module = "deltille")]
+#[pyclass(frozen, module = "deltille", eq)]
+#[derive(PartialEq)]
 pub struct Acceptance {
     found: calibrate::Acceptance,
     has_table: bool,

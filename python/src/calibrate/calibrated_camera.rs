@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use deltille::calibrate::Matrix;
 use deltille::calibrate::{self as solver, CameraEstimate, Source, ViewEstimate};
+use deltille::camera;
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 
@@ -187,6 +188,20 @@ impl CalibratedCamera {
         all.map(view).collect()
     }
 
+    /// Rotation vectors of the poses of the target in the views, V × 3, float64, rad: those of ``cv2.calibrateCamera``.
+    #[getter]
+    fn rvecs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let views = self.estimate().views.iter();
+        let turn = |view: &ViewEstimate| view.pose.off(&camera::Pose::IDENTITY)[0].to_array();
+        arrays::rows(py, views.map(turn))
+    }
+
+    /// Translations of the poses of the target in the views, V × 3, float64, mm: those of ``cv2.calibrateCamera``.
+    #[getter]
+    fn tvecs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        arrays::rows(py, self.estimate().views.iter().map(|view| view.pose.translation.to_array()))
+    }
+
     /// Index of the view of each corner, N, int64.
     #[getter]
     fn view_indices<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
@@ -288,6 +303,10 @@ impl CalibratedCamera {
             })
         };
         record(py, &tried.iter().map(one).collect::<Vec<_>>())
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.index == other.index && self.solved.is_same(&other.solved)
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, Part> {

@@ -22,7 +22,7 @@ use super::views::{Diagnosis, Excluded};
 use crate::boundary::arrays::{self, record};
 use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
 use crate::boundary::text_file::save_text;
-use crate::see::detection::Targets;
+use crate::see::arguments::Targets;
 use crate::see::pose::Pose;
 use crate::targets::target::Target;
 
@@ -465,6 +465,13 @@ impl Rig {
 
     fn __eq__(&self, other: &Self) -> bool {
         self.solved.is_same(&other.solved)
+    }
+}
+
+impl Rig {
+    /// Returns the camera with a name.
+    pub fn named(&self, name: &str) -> PyResult<&solver::CameraEstimate> {
+        Ok(&self.solved.estimate.cameras[camera_index(&self.solved, name)?])
     }
 }
 

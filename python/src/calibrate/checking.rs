@@ -14,7 +14,7 @@ use super::keywords::of_detections;
 use super::solving::{How, Named, Seen, Solved, assume, named};
 use crate::boundary::errors;
 use crate::boundary::errors::{Raise, raised, unlocked};
-use crate::see::detection::{Results, Targets};
+use crate::see::arguments::{Results, Targets};
 use crate::see::detector::sides;
 
 /// A quantity that may have changed, of a camera if there are several.
@@ -55,7 +55,8 @@ impl From<&calibrate::Suspect> for Suspect {
 }
 
 /// The test of one quantity.
-#[pyclass(frozen, module = "deltille")]
+#[pyclass(frozen, module = "deltille", eq)]
+#[derive(PartialEq)]
 pub struct QuantityTest(calibrate::QuantityTest);
 
 #[pymethods]
@@ -103,7 +104,8 @@ impl QuantityTest {
 }
 
 /// Whether a camera or a rig is still as calibrated, and the evidence.
-#[pyclass(frozen, module = "deltille")]
+#[pyclass(frozen, module = "deltille", eq)]
+#[derive(PartialEq)]
 pub struct Check(calibrate::Check);
 
 #[pymethods]

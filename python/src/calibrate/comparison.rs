@@ -18,8 +18,9 @@ use super::calibration::Rig;
 use super::solving::{Solved, print_scale_of};
 use crate::boundary::arrays::{self, distance};
 use crate::boundary::errors::{self, Raise, raised, unlocked};
+use crate::see::arguments::Targets;
 use crate::see::camera::Camera;
-use crate::see::detection::{Detection, Targets};
+use crate::see::detection::Detection;
 use crate::see::pose::Pose;
 use crate::targets::target::Target;
 
@@ -85,7 +86,8 @@ impl Part {
 }
 
 /// How two calibrations of a camera differ over its image.
-#[pyclass(frozen, module = "deltille")]
+#[pyclass(frozen, module = "deltille", eq)]
+#[derive(PartialEq)]
 pub struct Comparison {
     name: String,
     found: calibrate::Comparison,
@@ -181,7 +183,8 @@ fn significance(is_significant: Option<bool>) -> &'static str {
 }
 
 /// Motion of a camera of a rig between two calibrations.
-#[pyclass(frozen, module = "deltille")]
+#[pyclass(frozen, module = "deltille", eq)]
+#[derive(PartialEq)]
 pub struct Motion(CameraMotion);
 
 #[pymethods]
@@ -345,7 +348,7 @@ pub struct Located {
 }
 
 /// The inputs of a pose.
-#[derive(Clone)]
+#[derive(Clone, PartialEq)]
 struct Asked {
     detection: Detection,
     camera: Camera,
@@ -417,6 +420,10 @@ impl Located {
 
     fn __bool__(&self) -> bool {
         self.estimate.is_some()
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.asked == other.asked
     }
 
     fn __reduce__<'py>(
@@ -512,7 +519,8 @@ impl Asked {
         let sheet = Sheet { print_scale: self.print_scale, shape: None, sheets };
         let target = &printing.target;
         let reference = Reference::Target(target);
-        let named = [(found.image.clone(), (**found).clone())];
+        let name = if found.image.is_empty() { "the image" } else { &found.image };
+        let named = [(name.to_owned(), (**found).clone())];
         let of = |why: Option<String>, estimate: Option<calibrate::Estimate>, warnings| Located {
             estimate: estimate.map(Arc::new),
             why,

@@ -11,7 +11,8 @@ use crate::boundary::arrays;
 /// The first unknowns are shared by all frames: for each camera its parameters and the rotation (rx, ry, rz) and translation
 /// (tx, ty, tz) of its pose on the rig, then those of panels and targets, and the shape of the board. The poses of frames and
 /// the offsets of measured corners follow if they were requested.
-#[pyclass(frozen, module = "deltille")]
+#[pyclass(frozen, module = "deltille", eq)]
+#[derive(PartialEq)]
 pub struct JointCovariance(pub solver::JointCovariance);
 
 #[pymethods]

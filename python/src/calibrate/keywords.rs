@@ -13,8 +13,9 @@ use pyo3::types::PyMapping;
 use super::calibration::{Calibration, Rig, calibration};
 use super::solving::{How, ModelChoice, OneCamera, Seen, Texts, constraints, named, solve};
 use crate::boundary::errors::{self, RaiseFile, raised};
+use crate::see::arguments::{Results, Targets};
 use crate::see::camera::Camera;
-use crate::see::detection::{Detection, Results, Targets};
+use crate::see::detection::Detection;
 use crate::see::detector::sides;
 
 /// Calibrates a camera from detections.
@@ -28,7 +29,7 @@ use crate::see::detector::sides;
 /// model : str, optional
 ///     ``"radtan"``, ``"radtan5"``, ``"rational"``, ``"thin-prism"``, ``"kannala-brandt"``, ``"eucm"``,
 ///     ``"double-sphere"``, ``"pupil"``, ``"spline"``, or ``"auto"``, which selects the model with the lowest error on
-///     held-out views.
+///     held-out views. Names of other programs work too: OpenCV's ``"fisheye"`` is ``"kannala-brandt"``.
 /// camera : Camera, optional
 ///     A known camera, which is kept fixed; only the poses are estimated.
 /// grid : str, optional

@@ -10,12 +10,13 @@ use super::keywords::of_detections;
 use super::solving::{ModelChoice, Seen, assume, named};
 use crate::boundary::arrays::{self, number, whole};
 use crate::boundary::errors::{self, Raise, raised, unlocked};
+use crate::see::arguments::{Results, Targets};
 use crate::see::camera::Camera;
-use crate::see::detection::{Results, Targets};
 use crate::see::pose::Pose;
 
 /// A proposed view: the pose of the board that improves the calibration most.
-#[pyclass(frozen, module = "deltille")]
+#[pyclass(frozen, module = "deltille", eq)]
+#[derive(PartialEq)]
 pub struct NextView {
     next: deltille::calibrate::NextView,
     target: String,

@@ -18,12 +18,13 @@ use super::keywords::of_detections;
 use super::solving::{How, Named, Seen, assume, named};
 use crate::boundary::arrays;
 use crate::boundary::errors::{self, Raise, raised, unlocked};
+use crate::see::arguments::{Results, Targets};
 use crate::see::camera::Camera;
-use crate::see::detection::{Results, Targets};
 use crate::see::pose::Pose;
 
 /// Where a camera and a board are mounted on a robot.
-#[pyclass(frozen, module = "deltille")]
+#[pyclass(frozen, module = "deltille", eq)]
+#[derive(PartialEq)]
 pub struct HandEye(calibrate::HandEye);
 
 impl HandEye {

@@ -21,7 +21,8 @@ use serde_json::Value;
 use crate::boundary::arrays::{number, vector, whole};
 use crate::boundary::errors::{self, Raise, raised, warn};
 use crate::boundary::interrupt::interruptible;
-use crate::see::detection::{Detection, Targets};
+use crate::see::arguments::Targets;
+use crate::see::detection::Detection;
 use crate::see::detector::{size, tiling};
 
 /// The photographed target.
@@ -220,6 +221,9 @@ pub struct ModelChoice(pub Option<Model>);
 
 impl ModelChoice {
     pub fn of(text: &str) -> PyResult<Self> {
+        if let Some(model) = Model::named_elsewhere(text) {
+            return Ok(Self(Some(model)));
+        }
         match text {
             "auto" => Ok(Self(None)),
             _ => match text.parse() {
@@ -358,9 +362,18 @@ impl Solved {
         }
     }
 
-    /// Whether two results are equal, corner by corner.
+    /// Whether two results are equal, corner by corner if the corners of both are known.
     pub fn is_same(&self, other: &Self) -> bool {
-        self.json(Residuals::Listed) == other.json(Residuals::Listed)
+        let has_corners = self.has_corners() && other.has_corners();
+        let content = |solved: &Self| {
+            let listed = if has_corners { Residuals::Listed } else { Residuals::Omitted };
+            let mut whole: Value = serde_json::from_str(&solved.json(listed)).unwrap_or_default();
+            if !has_corners {
+                forget_corners(&mut whole);
+            }
+            whole
+        };
+        content(self) == content(other)
     }
 
     /// Returns the diagnoses as plain data with a sentence each, and whether each is a failure.
@@ -384,6 +397,14 @@ impl Solved {
         };
         self.diagnoses.iter().map(said).collect()
     }
+}
+
+/// Removes the lists of corners from the content of a file.
+fn forget_corners(of: &mut Value) {
+    for view in of["views"].as_array_mut().into_iter().flatten() {
+        view.as_object_mut().map(|view| view.remove("corners"));
+    }
+    of["cameras"].as_array_mut().into_iter().flatten().for_each(forget_corners);
 }
 
 /// Returns the findings and diagnoses in a file.

@@ -9,14 +9,16 @@ use pyo3::prelude::*;
 use super::checking::{before, check_target, given};
 use super::solving::{Seen, assume};
 use crate::boundary::errors::{self, Raise, raised, unlocked, warn};
-use crate::see::detection::Targets;
+use crate::see::arguments::Targets;
 
 /// When the rows of each camera are exposed.
-#[pyclass(frozen, module = "deltille")]
+#[pyclass(frozen, module = "deltille", eq)]
+#[derive(PartialEq)]
 pub struct Timing(calibrate::Timing);
 
 /// The timing of one camera. Values are tuples with their standard deviation; ``None`` if the motion does not determine them.
-#[pyclass(frozen, module = "deltille")]
+#[pyclass(frozen, module = "deltille", eq)]
+#[derive(PartialEq)]
 pub struct CameraTiming(calibrate::CameraTiming);
 
 /// A value and its standard deviation.

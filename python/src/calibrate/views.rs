@@ -215,6 +215,10 @@ impl View {
         self.estimate().corners.len()
     }
 
+    fn __eq__(&self, other: &Self) -> bool {
+        (self.camera, self.view) == (other.camera, other.view) && self.solved.is_same(&other.solved)
+    }
+
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, Part> {
         let own = slf.get();
         let (restore, (json, targets)) = pickled(slf.py(), "_part", &own.solved)?;

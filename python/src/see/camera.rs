@@ -69,16 +69,13 @@ impl Camera {
         model: &str,
         distortion: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let width: u32 = whole("width", width, errors::camera)?;
-        let height: u32 = whole("height", height, errors::camera)?;
         let focal = match focal_px.extract::<f64>() {
             Ok(both) => [number("focal_px", both, FOCAL, errors::camera)?; 2],
             Err(_) => vector("focal_px", focal_px, FOCAL, errors::camera)?,
         };
-        let middle = [width, height].map(|side| (f64::from(side) - 1.0) / 2.0);
-        let centre = centre_px.map_or(Ok(middle), |centre| {
-            vector("centre_px", centre, place_px::RANGE, errors::camera)
-        })?;
+        let centre = centre_px
+            .map(|centre| vector("centre_px", centre, place_px::RANGE, errors::camera))
+            .transpose()?;
         let distortion = distortion
             .map(|all| arrays::numbers("distortion", all, coefficient::RANGE, errors::camera));
         let distortion = distortion.transpose()?.unwrap_or_default();
@@ -88,11 +85,61 @@ impl Camera {
             let what = format!("distortion: {model} has at most {most} coefficients, got {count}");
             return Err(errors::camera(what));
         }
-        let text = json!({
-            "width": width, "height": height, "focal_px": focal,
-            "centre_px": centre, "model": lens, "distortion": distortion,
-        });
-        camera::Camera::from_yaml(&text.to_string()).map(Self).raise(errors::camera)
+        Self::checked([width, height], focal, centre, lens, distortion)
+    }
+
+    /// Makes a camera from the results of ``cv2.calibrateCamera`` or ``cv2.fisheye.calibrate``.
+    ///
+    /// Parameters
+    /// ----------
+    /// matrix : array of 3 × 3
+    ///     The camera matrix ``K``, px.
+    /// distortion : sequence of floats, or None
+    ///     The coefficients ``D``: 4, 5, 8, 12 or 14, or the 4 of ``cv2.fisheye``. Of 14, the last two (a tilted sensor) must be 0.
+    /// size_px : (int, int)
+    ///     Width and height of the image.
+    /// fisheye : bool, optional
+    ///     Whether the coefficients are those of ``cv2.fisheye``.
+    ///
+    /// Returns
+    /// -------
+    /// Camera
+    ///
+    /// Raises
+    /// ------
+    /// CameraError
+    ///     If there is no such camera, or if the sensor is tilted.
+    #[staticmethod]
+    #[pyo3(signature = (matrix, distortion, size_px, *, fisheye = false))]
+    fn from_opencv(
+        matrix: &Bound<'_, PyAny>,
+        distortion: Option<&Bound<'_, PyAny>>,
+        size_px: (i64, i64),
+        fisheye: bool,
+    ) -> PyResult<Self> {
+        let wrong = |what: String| Err(errors::camera(what));
+        let rows = arrays::rows_of::<3>("matrix", matrix)?;
+        let [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]] = rows[..] else {
+            return wrong("matrix: expected fx, 0, cx; 0, fy, cy; 0, 0, 1".to_owned());
+        };
+        let distortion = distortion
+            .map(|all| arrays::numbers("distortion", all, coefficient::RANGE, errors::camera));
+        let mut distortion = distortion.transpose()?.unwrap_or_default();
+        let (known, model): (&[usize], _) = match fisheye {
+            true => (&[0, 4], "fisheye"),
+            false => (&[0, 4, 5, 8, 12, 14], "pinhole"),
+        };
+        if !known.contains(&distortion.len()) {
+            let known = known[1..].iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
+            let count = distortion.len();
+            return wrong(format!("distortion: expected {known} coefficients, got {count}"));
+        }
+        if distortion.drain(12.min(distortion.len())..).any(|tilt| tilt != 0.0) {
+            let what = "distortion: a tilted sensor (the last two of 14 coefficients) is not supported; \
+                        calibrate without CALIB_TILTED_MODEL";
+            return wrong(what.to_owned());
+        }
+        Self::checked(size_px.into(), [fx, fy], Some([cx, cy]), model, distortion)
     }
 
     /// Reads a camera file of this package (``.yaml``), of ROS or of OpenCV.
@@ -183,6 +230,13 @@ impl Camera {
 
     /// The 3 × 3 camera matrix, float64, as in OpenCV.
     #[getter]
+    #[pyo3(name = "K")]
+    fn k<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        self.matrix(py)
+    }
+
+    /// The 3 × 3 camera matrix, like :attr:`K`.
+    #[getter]
     fn matrix<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         let ([fx, fy], [cx, cy]) = (self.0.focal_px.to_array(), self.0.centre_px.to_array());
         arrays::rows(py, [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
@@ -194,6 +248,12 @@ impl Camera {
     /// ------
     /// CameraError
     ///     If OpenCV does not support this lens.
+    #[getter]
+    fn dist<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        self.distortion(py)
+    }
+
+    /// Distortion coefficients for OpenCV, like :attr:`dist`.
     #[getter]
     fn distortion<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let found = formats::opencv_coefficients(&self.0).raise(errors::camera)?;
@@ -295,6 +355,24 @@ impl Camera {
 }
 
 impl Camera {
+    /// Makes a camera from numbers in their ranges; the principal point defaults to the centre of the image.
+    fn checked(
+        [width, height]: [i64; 2],
+        focal_px: [f64; 2],
+        centre_px: Option<[f64; 2]>,
+        lens: &str,
+        distortion: Vec<f64>,
+    ) -> PyResult<Self> {
+        let width: u32 = whole("width", width, errors::camera)?;
+        let height: u32 = whole("height", height, errors::camera)?;
+        let middle = [width, height].map(|side| (f64::from(side) - 1.0) / 2.0);
+        let text = json!({
+            "width": width, "height": height, "focal_px": focal_px,
+            "centre_px": centre_px.unwrap_or(middle), "model": lens, "distortion": distortion,
+        });
+        camera::Camera::from_yaml(&text.to_string()).map(Self).raise(errors::camera)
+    }
+
     /// Returns the text of a camera file in a format.
     pub fn text(
         &self,

@@ -8,17 +8,18 @@ use deltille::calibrate::Reference;
 use deltille::detect::{self, GridCorner};
 use deltille::export::named::named;
 use deltille::export::tables::{ImageRecord, folder};
-use deltille::export::{DETECTION_FORMATS, detection};
+use deltille::export::{DETECTION_FORMATS, detection, overlay};
 use deltille::limits::Limits;
 use deltille::targets;
-use numpy::{PyArray1, PyArray2, PyArray3};
-use pyo3::exceptions::PyTypeError;
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::arguments::Targets;
 use super::frames::seconds;
 use crate::boundary::arrays::{self, record};
-use crate::boundary::errors::{self, Raise, RaiseFile, raised};
+use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
+use crate::boundary::image::Picture;
 use crate::boundary::text_file::save_text;
 use crate::pickles;
 use crate::targets::families;
@@ -105,7 +106,7 @@ impl DecodedTag {
 /// The detections in one image: corners with their labels, positions and covariances.
 ///
 /// All arrays have one row for each of the N corners, in the same order, grid after grid. Each access makes a new array.
-#[pyclass(frozen, module = "deltille")]
+#[pyclass(frozen, module = "deltille", eq)]
 #[derive(Clone)]
 pub struct Detection {
     pub found: Arc<detect::Detection>,
@@ -120,6 +121,12 @@ pub struct Detection {
 pub struct Grid {
     of: Detection,
     index: usize,
+}
+
+impl PartialEq for Detection {
+    fn eq(&self, other: &Self) -> bool {
+        self.found == other.found
+    }
 }
 
 impl Detection {
@@ -281,6 +288,10 @@ impl Grid {
     #[getter]
     fn kind(&self) -> &'static str {
         families::kind(self.of.found.grids[self.index].kind)
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.of.found.grids[self.index] == other.of.found.grids[other.index]
     }
 
     fn __repr__(&self) -> String {
@@ -472,6 +483,41 @@ impl Detection {
         self.found.file.damage.as_deref()
     }
 
+    /// Draws the corners, grids and ids over the image.
+    ///
+    /// Parameters
+    /// ----------
+    /// image : ndarray
+    ///     The image, as for :meth:`Detector.detect`.
+    /// legible : bool, optional
+    ///     Enlarge or reduce the image until all ids are legible, as ``deltille detect --overlay`` does.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of H × W × 3, uint8
+    ///     Red, green, blue; of the size of the image unless ``legible``.
+    #[pyo3(signature = (image, *, legible = false))]
+    fn draw<'py>(
+        &self,
+        py: Python<'py>,
+        image: &Bound<'py, PyAny>,
+        legible: bool,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let picture = Picture::of(image, &Limits::default())?.grey_values()?;
+        let size = [picture.width(), picture.height()];
+        if size != [self.found.width as usize, self.found.height as usize] {
+            let (width, height) = (self.found.width, self.found.height);
+            let what = format!(
+                "the image has {} × {} px, but the detection is of one with {width} × {height} px",
+                size[0], size[1]
+            );
+            return Err(errors::image(what));
+        }
+        let drawn = unlocked(py, || overlay::rgb(&picture, &self.found, legible))?;
+        let (pixels, [width, height]) = drawn.raise(errors::image)?;
+        Ok(PyArray1::from_vec(py, pixels).reshape([height, width, 3])?.into_any())
+    }
+
     fn __repr__(&self) -> String {
         let corners: usize = self.grids().map(|grid| grid.corners.len()).sum();
         let tags: usize = self.grids().map(|grid| grid.tags.len()).sum();
@@ -481,10 +527,6 @@ impl Detection {
             "<Detection {name}: {} grids, {corners} corners, {tags} tags{why}>",
             self.found.grids.len()
         )
-    }
-
-    fn __eq__(&self, other: &Self) -> bool {
-        self.found == other.found
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, (String, Vec<Target>)> {
@@ -507,21 +549,6 @@ pub fn _grid(of: &Detection, index: usize) -> PyResult<Grid> {
     match index < of.found.grids.len() {
         true => Ok(Grid { of: of.clone(), index }),
         false => Err(raised::DetectionError::new_err(format!("the detection has no grid {index}"))),
-    }
-}
-
-/// A target, or several.
-pub struct Targets(pub Vec<Target>);
-
-impl<'a, 'py> FromPyObject<'a, 'py> for Targets {
-    type Error = PyErr;
-
-    fn extract(given: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
-        if let Ok(target) = given.cast::<Target>() {
-            return Ok(Self(vec![target.get().clone()]));
-        }
-        let all = given.try_iter()?.map(|target| Ok(target?.cast::<Target>()?.get().clone()));
-        all.collect::<PyResult<_>>().map(Self)
     }
 }
 
@@ -556,47 +583,4 @@ pub fn _tables(
     };
     let read = folder::read(&files, &Limits::default()).raise_of_file(&first, errors::file)?;
     read.images.into_iter().map(row).collect()
-}
-
-/// Results of `detect_many`, without the images that could not be read.
-pub struct Results<'py> {
-    pub all: Vec<PyRef<'py, Detection>>,
-    is_read: Vec<bool>,
-}
-
-impl Results<'_> {
-    /// Selects the names of the images that were read from the names of all.
-    pub fn names(&self, names: Option<Vec<String>>) -> Option<Vec<String>> {
-        let names = names?;
-        if names.len() != self.is_read.len() {
-            return Some(names);
-        }
-        let read = names.into_iter().zip(&self.is_read).filter(|(_, is_read)| **is_read);
-        Some(read.map(|(name, _)| name).collect())
-    }
-}
-
-impl<'a, 'py> FromPyObject<'a, 'py> for Results<'py> {
-    type Error = PyErr;
-
-    fn extract(given: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
-        let wrong = |what: String| PyTypeError::new_err(format!("detections: {what}"));
-        if given.cast::<Detection>().is_ok() {
-            return Err(wrong("expected a list, [detection]".to_owned()));
-        }
-        let (mut all, mut is_read) = (Vec::new(), Vec::new());
-        for one in given.try_iter()? {
-            let one = one?;
-            if let Ok(found) = one.cast::<Detection>() {
-                all.push(found.clone().borrow());
-                is_read.push(true);
-            } else if one.getattr("error").is_ok_and(|error| !error.is_none()) {
-                is_read.push(false);
-            } else {
-                let kind = one.get_type().qualname()?;
-                return Err(wrong(format!("expected Detection, got {kind}")));
-            }
-        }
-        Ok(Self { all, is_read })
-    }
 }

@@ -12,7 +12,8 @@ use deltille::targets::SIDES;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::detection::{Detection, Targets};
+use super::arguments::Targets;
+use super::detection::Detection;
 use super::frames::detected;
 use crate::boundary::arrays::whole;
 use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
@@ -225,7 +226,7 @@ impl Detector {
     /// Parameters
     /// ----------
     /// image : ndarray or Frame
-    ///     A frame of :func:`frames`, or H × W of uint8, uint16 or float32 (0, black, to 1, white), or H × W × 3 of uint8 in the order red, green, blue
+    ///     A frame of :func:`frames`, or H × W of uint8, uint16, float32 or float64 (0, black, to 1, white), or H × W × 3 of uint8 in the order red, green, blue
     ///     (for OpenCV's blue, green, red, pass ``image[..., ::-1]``). Any strides are allowed; contiguous rows are not
     ///     copied.
     /// name : str, optional

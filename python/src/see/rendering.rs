@@ -110,6 +110,15 @@ impl Truth {
         self.corners.len()
     }
 
+    /// A file has the rotation as a matrix, so poses are equal up to rounding.
+    fn __eq__(&self, other: &Self) -> bool {
+        let off = self.pose.0.off(&other.pose.0);
+        let is_same_pose = off.into_iter().all(|part| part.length() < 1e-9);
+        is_same_pose
+            && (&self.corners, &self.light, &self.target)
+                == (&other.corners, &other.light, &other.target)
+    }
+
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, (String,)> {
         Ok((slf.get_type().getattr("from_json")?, (slf.get().to_json(""),)))
     }
@@ -131,7 +140,7 @@ impl From<truth::Truth> for Truth {
 /// Parameters
 /// ----------
 /// target : Target
-///     A board or a solid.
+///     A board or a solid. A board faces the side of z > 0; ChArUco boards and circle grids that of z < 0.
 /// camera : Camera
 /// pose : Pose, optional
 ///     Camera from target.
@@ -159,7 +168,7 @@ impl From<truth::Truth> for Truth {
 /// image : ndarray of H × W
 ///     Grey values of the requested type.
 /// truth : Truth
-///     The true positions of all corners in view.
+///     The true positions of all corners in view. Without any, a ``UserWarning`` is issued.
 #[pyfunction]
 #[pyo3(signature = (target, camera, pose = None, *, eye = None, look_at = None, up = None, blur_px = 0.8,
     noise = 0.01, gradient = None, white = 0.9, black = 0.1, background = 0.5, seed = 0, dtype = "uint8"))]
@@ -235,6 +244,17 @@ pub fn render<'py>(
         ))
     })?;
     let (image, corners) = drawn.raise(errors::target)?;
+    if corners.is_empty() {
+        // In the frames of OpenCV's boards, z points into the board.
+        let first = target.target().panels.first();
+        let is_away = first.is_some_and(|panel| panel.pose.matrix().z_axis.z < 0.0);
+        let side = if is_away { "z < 0" } else { "z > 0" };
+        let what = format!(
+            "{name} is behind the camera, out of view, or seen from its back: eye looks at the middle of the target, \
+             and a board faces the side of {side}"
+        );
+        errors::warn(py, &what)?;
+    }
     let shape = (image.height(), image.width());
     let pixels = image.pixels();
     let full = "an image has all its pixels";

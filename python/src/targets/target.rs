@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use deltille::export::artifacts::{Files, Making, What, make, write_set};
 use deltille::lattice::GridKind;
@@ -27,8 +28,8 @@ use crate::pickles;
 ///
 /// Make one with :class:`Board`, :class:`Checkerboard`, :class:`Icosahedron` and the other classes, or read one with
 /// :meth:`load`. The frame of a board is right-handed: x right, y up on the print, z towards the viewer.
-#[pyclass(frozen, subclass, module = "deltille")]
-#[derive(Clone)]
+#[pyclass(frozen, subclass, module = "deltille", eq)]
+#[derive(Clone, PartialEq)]
 pub struct Target {
     pub printing: Arc<Printing>,
 }
@@ -67,8 +68,24 @@ impl Target {
         self.target().family().ok().flatten()
     }
 
-    fn made(&self, what: What, making: Making) -> PyResult<Files> {
-        make(&self.printing, what, making).raise(errors::target)
+    /// Makes the files of some formats; Ctrl-C ends it.
+    fn made(&self, py: Python<'_>, formats: &[What], making: Making) -> PyResult<Files> {
+        let (own, formats) = (self.clone(), formats.to_vec());
+        interruptible(py, move |stop| {
+            let mut files: Files = Vec::new();
+            for what in formats {
+                if stop.load(Ordering::Relaxed) {
+                    break;
+                }
+                for (name, bytes) in make(&own.printing, what, making).raise(errors::target)? {
+                    // Models for simulators share the files of the OBJ.
+                    if files.iter().all(|(other, _)| *other != name) {
+                        files.push((name, bytes));
+                    }
+                }
+            }
+            Ok(files)
+        })?
     }
 }
 
@@ -211,8 +228,8 @@ impl Target {
     /// Returns
     /// -------
     /// bytes
-    fn pdf(&self) -> PyResult<Vec<u8>> {
-        Ok(self.made(What::Pdf, Making::default())?.remove(0).1)
+    fn pdf(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
+        Ok(self.made(py, &[What::Pdf], Making::default())?.remove(0).1)
     }
 
     /// Returns a page as SVG.
@@ -226,8 +243,8 @@ impl Target {
     /// -------
     /// str
     #[pyo3(signature = (page = 0))]
-    fn svg(&self, page: i64) -> PyResult<String> {
-        let pages = self.made(What::Svg, Making::default())?;
+    fn svg(&self, py: Python<'_>, page: i64) -> PyResult<String> {
+        let pages = self.made(py, &[What::Svg], Making::default())?;
         let count = pages.len();
         let found = usize::try_from(page).ok().and_then(|page| pages.into_iter().nth(page));
         let none = || {
@@ -286,7 +303,7 @@ impl Target {
         let what = Formats::One(format.to_owned()).parsed()?;
         let making = given.making(self.target(), &what)?;
         let files = PyDict::new(py);
-        for (name, bytes) in unlocked(py, || self.made(what[0], making))?? {
+        for (name, bytes) in self.made(py, &what, making)? {
             files.set_item(name, PyBytes::new(py, &bytes))?;
         }
         Ok(files)
@@ -329,20 +346,11 @@ impl Target {
     ) -> PyResult<Vec<PathBuf>> {
         let given =
             Keywords { dpi, texture_dpi, texture_px, textures, plate_mm, inlay_mm, kerf_mm };
-        let formats = formats.map_or_else(|| Ok(vec![What::Pdf]), Formats::parsed)?;
+        let mut formats = formats.map_or_else(|| Ok(vec![What::Pdf]), Formats::parsed)?;
         let making = given.making(self.target(), &formats)?;
-        unlocked(py, || {
-            let mut files = self.made(What::Json, making)?;
-            for &what in formats.iter().filter(|what| **what != What::Json) {
-                for (name, bytes) in self.made(what, making)? {
-                    // Models for simulators share the files of the OBJ.
-                    if files.iter().all(|(other, _)| *other != name) {
-                        files.push((name, bytes));
-                    }
-                }
-            }
-            write_set(&folder, &files, overwrite).raise_of_file(&folder, errors::file)
-        })?
+        formats.insert(0, What::Json);
+        let files = self.made(py, &formats, making)?;
+        unlocked(py, || write_set(&folder, &files, overwrite))?.raise_of_file(&folder, errors::file)
     }
 
     /// Checks that this target can be used together with another one: they share no board id, and no tag id of the same family.
@@ -392,7 +400,7 @@ impl Target {
             None => {
                 let no_pages = self.printing.sheets.is_empty();
                 let usual = if no_pages { What::Gltf } else { What::Pdf };
-                let files = self.made(usual, Making::default())?;
+                let files = self.made(py, &[usual], Making::default())?;
                 (files[0].0.clone(), Some(files))
             }
         };
@@ -417,8 +425,10 @@ impl Target {
     }
 
     /// Renders a preview of the first page for notebooks.
-    fn _repr_html_(&self) -> String {
-        let Ok(pages) = self.made(What::Svg, Making::default()) else { return self.__repr__() };
+    fn _repr_html_(&self, py: Python<'_>) -> String {
+        let Ok(pages) = self.made(py, &[What::Svg], Making::default()) else {
+            return self.__repr__();
+        };
         let page = String::from_utf8_lossy(&pages[0].1).into_owned();
         // Drop the paper size and keep only the view box.
         let start = page.find("<svg").unwrap_or(0);
@@ -446,10 +456,6 @@ impl Target {
             self.all().count(),
         )
         .replace(" >", ">")
-    }
-
-    fn __eq__(&self, other: &Self) -> bool {
-        self.printing == other.printing
     }
 
     fn __reduce__<'py>(

@@ -19,7 +19,8 @@ pub enum Proof {
 }
 
 /// Whether a file shows its target, and how it differs.
-#[pyclass(frozen, module = "deltille")]
+#[pyclass(frozen, module = "deltille", eq)]
+#[derive(PartialEq)]
 pub struct Verdict {
     verdict: verify::Verdict,
     record: Value,

@@ -69,11 +69,13 @@ pub fn tagged_tiles(
     spacing: u32,
     tags_in: TagsIn,
 ) -> Vec<Vertex> {
-    let corners: std::collections::BTreeSet<Vertex> = corners.iter().copied().collect();
+    // Faster than a set for the quarter of a million corners of the largest boards.
+    let mut corners = corners.to_vec();
+    corners.sort_unstable();
     let carries = |&v: &Vertex| {
         let tile = kind.tag_tile(v);
         tile.is_dark() == (tags_in == TagsIn::Black)
-            && tile.vertices().all(|v| corners.contains(&v))
+            && tile.vertices().all(|v| corners.binary_search(&v).is_ok())
     };
     let spacing = spacing as i32;
     let mut by_start = BTreeMap::<(i32, i32), Vec<Vertex>>::new();
@@ -101,22 +103,27 @@ pub(crate) fn panels(
     family: Option<&Family>,
 ) -> Result<(Vec<Panel>, Option<FamilyRef>), TargetError> {
     spec.check()?;
-    let panels = untied_panels(spec);
-    let Some(tags) = &spec.tags else { return Ok((panels, None)) };
+    let Some(tags) = &spec.tags else { return Ok((untied_panels(spec), None)) };
     let vertices = board_vertices(spec.grid, spec.rows, spec.cols);
     let on_each = |spacing| tagged_tiles(spec.grid, &vertices, spacing, tags.tags_in).len() as u64;
     let boards = u64::from(spec.panel_count());
+    let on_one = on_each(tags.spacing);
     let instead = |available: u64| {
-        let wider = wider_spacing(tags, available, |spacing| boards * on_each(spacing));
-        let fewer = available / on_each(tags.spacing).max(1);
+        let tiles = on_each(1);
+        let wider = wider_spacing(tags, available, |spacing| {
+            // The start with the most tags has at least the mean. On large boards, no other spacing needs counting.
+            let least = boards * tiles.div_ceil(u64::from(spacing).pow(2));
+            if least > available { least } else { boards * on_each(spacing) }
+        });
+        let fewer = available / on_one.max(1);
         let fewer =
             (fewer > 0 && spec.boards > 1).then(|| format!("use at most {fewer} {BoardBoards}"));
         wider.into_iter().chain(fewer).collect()
     };
-    let needed = boards * on_each(tags.spacing);
+    let needed = boards * on_one;
     let family =
         check_family(spec.grid, tags, spec.edge_mm, family, needed, TagSettings::TAGS, instead)?;
-    Ok((panels, Some(family)))
+    Ok((untied_panels(spec), Some(family)))
 }
 
 /// Returns the panels of a checked spec, regardless of the size of its family.

@@ -53,7 +53,28 @@ pub enum OverlayError {
 /// # Errors
 /// Returns an error if the image is too large to draw on, or if it cannot be encoded.
 pub fn jpeg(image: &AnyGray, detection: &Detection) -> Result<Vec<u8>, OverlayError> {
-    let scale = Scale::of([image.width(), image.height()].map(|side| side as u32), detection);
+    let (opaque, [width, height]) = rgb(image, detection, true)?;
+    let mut jpeg = Vec::new();
+    JpegEncoder::new_with_quality(&mut jpeg, QUALITY)
+        .encode(&opaque, width as u32, height as u32, ExtendedColorType::Rgb8)
+        .map_err(|error| OverlayError::Encode(error.to_string()))?;
+    Ok(signed_jpeg(jpeg))
+}
+
+/// Returns a photograph with its detection drawn on it: red, green and blue, row by row, and the width and height. They are
+/// those of the photograph, or such that the text is legible. `detection` has positions in px of `image`.
+///
+/// # Errors
+/// Returns an error if the image is too large to draw on.
+pub fn rgb(
+    image: &AnyGray,
+    detection: &Detection,
+    is_legible: bool,
+) -> Result<(Vec<u8>, [usize; 2]), OverlayError> {
+    let scale = match is_legible {
+        true => Scale::of([image.width(), image.height()].map(|side| side as u32), detection),
+        false => Scale::ONE,
+    };
     let mut canvas = match image {
         AnyGray::U8(image) => background(image, scale)?,
         AnyGray::U16(image) => background(image, scale)?,
@@ -62,13 +83,8 @@ pub fn jpeg(image: &AnyGray, detection: &Detection) -> Result<Vec<u8>, OverlayEr
         let [r, g, b] = COLOURS[index % COLOURS.len()];
         draw_grid(&mut canvas, grid, Color::from_rgba8(r, g, b, 255), scale.factor());
     }
-    let opaque: Vec<u8> =
-        canvas.pixels().iter().flat_map(|p| [p.red(), p.green(), p.blue()]).collect();
-    let mut jpeg = Vec::new();
-    JpegEncoder::new_with_quality(&mut jpeg, QUALITY)
-        .encode(&opaque, canvas.width(), canvas.height(), ExtendedColorType::Rgb8)
-        .map_err(|error| OverlayError::Encode(error.to_string()))?;
-    Ok(signed_jpeg(jpeg))
+    let opaque = canvas.pixels().iter().flat_map(|p| [p.red(), p.green(), p.blue()]).collect();
+    Ok((opaque, [canvas.width(), canvas.height()].map(|side| side as usize)))
 }
 
 /// Returns a PNG file with outlines and dots drawn over a photograph, or over a black image of the
