@@ -149,7 +149,7 @@ export function targetForm({ changed: report, chooseMesh, chooseLogo }: Given): 
     const own = (key: keyof Settings, make: () => HTMLElement) => (applies(key, settings) ? [make()] : []);
     const logo = el("button", { type: "button", click: () => (settings.logo === null ? chooseLogo() : changed({ logo: null, logo_height_mm: null }, true)) }, settings.logo === null ? text.chooseLogo : text.removeLogo);
     return [
-      field(text.logo, logo),
+      el("div", { class: "field" }, logo),
       ...(settings.logo === null ? [] : [number(text.logoHeight, "logo_height_mm", 1, 1000, text.usual)]),
       line(text.note, "note", text.none),
       ...own("two_sided_mm", () => number(text.twoSided, "two_sided_mm", 0.1, 1000, text.oneSide)),
