@@ -482,7 +482,7 @@ test("folders can be dropped, duplicates are skipped, and a photograph can be re
     await expect(page.getByRole("alert")).toContainText(`${name}: `);
     await expect(photographs).toHaveCount(2);
   }
-  await page.getByRole("link", { name: "Calibrate" }).click();
+  await page.getByRole("link", { name: "Calibrate", exact: true }).click();
   await expect(page.getByText("2 images with labelled corners")).toBeVisible();
 });
 
@@ -492,7 +492,7 @@ test.describe("calibrate", () => {
     const shots = Array.from({ length: 10 }, (_, i) => join(folder, `${i}.png`));
     await chooseFiles(page, [join(folder, "board.json"), ...shots]);
     await expect(page.getByRole("button", { name: /9\.png \d+ corners/ })).toBeVisible({ timeout: 60_000 });
-    await page.getByRole("link", { name: "Calibrate" }).click();
+    await page.getByRole("link", { name: "Calibrate", exact: true }).click();
     await expect(page.getByText("10 images with labelled corners")).toBeVisible();
     const covered = page.getByText(/10 images; \d+ % of the image area covered; tilts from \d+° to \d+°/);
     await expect(covered).toBeVisible({ timeout: 30_000 });
@@ -578,7 +578,7 @@ test.describe("calibrate", () => {
     await page.goto("/#see");
     await chooseFiles(page, [join(folder, "board.json"), join(folder, "0.png")]);
     await expect(page.getByRole("button", { name: /0\.png 72 corners/ })).toBeVisible({ timeout: 30_000 });
-    await page.getByRole("link", { name: "Calibrate" }).click();
+    await page.getByRole("link", { name: "Calibrate", exact: true }).click();
     await page.getByRole("button", { name: "Use a webcam" }).click();
     await expect(page.locator(".wish")).toContainText(/25 cm/, { timeout: 30_000 });
     await screen(page, "calibrate-guided-first");
