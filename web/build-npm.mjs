@@ -1,4 +1,4 @@
-// Makes the npm package `deltille`, in npm-package, from the modules in pkg. It has the version of the library.
+// Makes the npm package `deltille`, in npm-package, from the modules in pkg and the page in dist. It has the version of the library.
 import { cpSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -24,6 +24,7 @@ for (const name of modules) {
 }
 const families = join(root, "crates", "core", "families");
 for (const name of readdirSync(families).filter((name) => /\.(json|md)$/.test(name))) cpSync(join(families, name), join(folder, "families", name));
+cpSync(join(web, "dist"), join(folder, "page"), { recursive: true });
 for (const name of ["LICENSE-MIT", "LICENSE-APACHE"]) cpSync(join(root, name), join(folder, name));
 writeFileSync(join(folder, "README.md"), readme);
 const [, version] = /^version = "([^"]+)"/m.exec(readFileSync(join(root, "Cargo.toml"), "utf8"));

@@ -1,5 +1,6 @@
-// Builds the library as five modules, which the page loads on demand: `make` draws targets, `prove` verifies their files, `photo`
-// decodes photographs, `see` detects corners, `solve` calibrates. Needs the Rust target wasm32-unknown-unknown.
+// Builds the library as five modules, which the page loads on demand: `make` draws targets, `prove` makes PNG pages and meshes and
+// verifies files, `photo` decodes photographs, `see` detects corners, `solve` calibrates. Needs the Rust target
+// wasm32-unknown-unknown.
 //
 //     node build-wasm.mjs [MODULE…]
 import { execFileSync } from "node:child_process";

@@ -4,7 +4,7 @@ import { join } from "node:path";
 import { type Plugin, defineConfig } from "vite";
 
 /** Files cached at installation, so that the page works offline once loaded: all except images. */
-const KEPT = /\.(html|js|css|svg|wasm|json)$/;
+const KEPT = /\.(html|js|css|svg|wasm|json|txt|woff2)$/;
 
 /** Writes the service worker with the names of all files, and a version that changes with any of them. */
 function offline(): Plugin {
@@ -29,11 +29,27 @@ function offline(): Plugin {
   };
 }
 
+/** Draws the default board, which the page shows until the library has started. */
+const firstSheet: Plugin = {
+  name: "first-sheet",
+  apply: "build",
+  async generateBundle() {
+    const { Made, family_of_settings, initSync } = await import("./pkg/make/deltille.js");
+    initSync({ module: readFileSync("pkg/make/deltille_bg.wasm") });
+    const family = readFileSync(`../crates/core/families/${family_of_settings("{}")}.json`, "utf8");
+    const [, svg] = new Made("{}", family).files("svg");
+    this.emitFile({ type: "asset", fileName: "board.svg", source: svg as Uint8Array });
+  },
+};
+
+/** Loads styles without CORS, so that they apply to the page opened from a file, which then shows how to serve it. */
+const styles: Plugin = { name: "styles", transformIndexHtml: { order: "post", handler: (html) => html.replace('rel="stylesheet" crossorigin', 'rel="stylesheet"') } };
+
 // Relative addresses, so that the folder can be served from any path.
 export default defineConfig({
   base: "./",
   build: { target: "es2022", outDir: "dist", assetsInlineLimit: 0, chunkSizeWarningLimit: 800 },
   worker: { format: "es" },
   server: { fs: { allow: [".."] } },
-  plugins: [offline()],
+  plugins: [firstSheet, offline(), styles],
 });

@@ -2,9 +2,25 @@
 import { el, field, save, select } from "./dom";
 import { looking } from "./library";
 import { type Shot, made, seen, stem } from "./shared";
+import { posesPicture } from "./pictures";
 import { surveyed, tints } from "./survey";
 import { words } from "./words";
-import type { HoldStatus, Next, Result, Survey } from "./worker";
+import type { HoldStatus, Next, Result, Sought, Survey } from "./worker";
+
+/** Range of the print scale: beyond it, the check bars were misread. */
+const SCALES = [0.5, 2] as const;
+
+/** The print scale across and up the sheet from ratios, or from quotients of measured and stated lengths; null without any. */
+function printScale(text: string): [number, number] | null {
+  if (text.trim() === "") return null;
+  const ratios = text.split(",").map((part) => {
+    const [, measured, stated = "1"] = /^\s*(\d*\.?\d+)\s*(?:\/\s*(\d*\.?\d+))?\s*$/.exec(part) ?? [];
+    return Number(measured) / Number(stated);
+  });
+  const [across = NaN, up = across] = ratios;
+  if (ratios.length > 2 || ![across, up].every((ratio) => ratio >= SCALES[0] && ratio <= SCALES[1])) throw new Error(words.calibrate.noScale(text));
+  return [across, up];
+}
 
 export function calibrate(): HTMLElement {
   let model = "radtan";
@@ -38,19 +54,30 @@ export function calibrate(): HTMLElement {
   const now = el("button", { type: "button", hidden: true, click: () => (takeNow = true) }, words.calibrate.now);
   let takeNow = false;
   const forget = el("button", { type: "button", hidden: true, click: () => forgetAll() }, words.calibrate.forget);
+  const scale = el("input", { type: "text", inputmode: "decimal", placeholder: words.calibrate.printScaleUsual, input: () => tally() });
+  const empty = el(
+    "div",
+    { class: "empty" },
+    posesPicture(),
+    el("p", {}, words.calibrate.empty),
+    el("ol", {}, ...words.calibrate.steps.map(({ text, link, href }) => el("li", {}, text, link ? " " : null, link ? el("a", { href }, link) : null))),
+  );
   const webcam = el("button", { type: "button", click: () => void (stream ? stop() : start()) }, words.calibrate.webcam);
 
   /** The webcam's images if there are any, otherwise the photographs: they come from different cameras. */
   const shots = () => (stream || taken.length > 0 ? taken : seen.shots.filter((shot) => shot.labelled));
-  /** Inputs of a calibration. */
+  /** Inputs of the survey, and of a calibration. */
   const given = () => [target(), model, ...shots().map(({ json }) => json)];
+  const asked = () => [scale.value, ...given()];
   const isSame = (one: string[], other: string[]) => one.length === other.length && one.every((part, i) => part === other[i]);
-  const target = () => (seen.sought && "target" in seen.sought ? seen.sought.target : made.json);
+  const sought = (): Sought & { target: string } => (seen.sought && "target" in seen.sought ? seen.sought : { target: made.json, family: made.family });
+  const target = () => sought().target;
 
   function tally(): void {
     count.textContent = words.calibrate.few(shots().length);
     forget.hidden = taken.length === 0;
-    outdated.hidden = solvedOf.length === 0 || isSame(solvedOf, given());
+    outdated.hidden = solvedOf.length === 0 || isSame(solvedOf, asked());
+    empty.hidden = stream !== null || shots().length > 0;
     if (location.hash.startsWith("#calibrate")) void look();
   }
 
@@ -94,11 +121,11 @@ export function calibrate(): HTMLElement {
       return;
     }
     result.replaceChildren(el("p", { class: "busy" }, words.calibrate.solving));
-    solvedOf = given();
+    solvedOf = asked();
     tally();
     try {
       const all = shots();
-      show(await looking.call("calibrate", target(), all.map(({ json }) => json), all.map(({ name }) => stem(name)), model));
+      show(await looking.call("calibrate", target(), all.map(({ json }) => json), all.map(({ name }) => stem(name)), model, printScale(scale.value)));
     } catch (error) {
       solvedOf = [];
       tally();
@@ -208,7 +235,7 @@ export function calibrate(): HTMLElement {
       const name = `webcam-${String(taken.length).padStart(3, "0")}`;
       try {
         // The pixel buffer is transferred, and comes back with the detection.
-        const found = await looking.handing([data.buffer], "frame", { target: target() }, name, width, height, data, begin / 1000);
+        const found = await looking.handing([data.buffer], "frame", sought(), name, width, height, data, begin / 1000);
         if (!stream) break;
         context.putImageData(new ImageData(found.pixels as Uint8ClampedArray<ArrayBuffer>, width, height), 0, 0);
         // Without a proposal, show where corners are still missing.
@@ -299,12 +326,21 @@ export function calibrate(): HTMLElement {
   const whole = el(
     "section",
     { class: "calibrate", "aria-label": words.tabs.calibrate },
+    el("h2", { class: "title" }, words.calibrate.title),
     el("p", { class: "lead" }, words.calibrate.lead),
     el(
       "div",
       { class: "columns" },
-      el("div", {}, field(words.calibrate.model, select(Object.entries(words.calibrate.models), model, (value) => ((model = value), tally()))), field(words.calibrate.way, way), count, el("div", { class: "buttons" }, el("button", { type: "button", class: "first", click: () => void solve() }, words.calibrate.start), webcam, forget)),
-      el("div", { class: "stage" }, problem, wish, video, over, state, el("div", { class: "buttons" }, now, elsewhere), live, covered, drawings, outdated, result),
+      el(
+        "div",
+        { class: "settings" },
+        field(words.calibrate.model, select(Object.entries(words.calibrate.models), model, (value) => ((model = value), tally()))),
+        field(words.calibrate.printScale, scale, words.calibrate.printScaleHint),
+        field(words.calibrate.way, way),
+        count,
+        el("div", { class: "buttons" }, el("button", { type: "button", class: "first", click: () => void solve() }, words.calibrate.start), webcam, forget),
+      ),
+      el("div", { class: "stage" }, problem, empty, wish, video, over, state, el("div", { class: "buttons" }, now, elsewhere), live, covered, drawings, outdated, result),
     ),
   );
   for (const event of ["hashchange", "seen"]) window.addEventListener(event, tally);

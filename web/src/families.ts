@@ -164,6 +164,7 @@ export function families(): HTMLElement {
   return el(
     "section",
     { class: "families", "aria-label": words.tabs.families },
+    el("h2", { class: "title" }, words.families.title),
     el("p", { class: "lead" }, words.families.lead),
     el(
       "div",

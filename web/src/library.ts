@@ -39,7 +39,12 @@ class Client {
     return worker;
   }
 
-  /** Ends a worker after a crash, which leaves the module unusable; the next call starts a new one. */
+  /** Ends running calls, which fail without a message. */
+  cancel(): void {
+    if (this.waiting.size > 0 && this.worker) this.end(this.worker);
+  }
+
+  /** Ends a worker after a crash, which leaves the module unusable, or to cancel calls; the next call starts a new one. */
   private end(worker: Worker): void {
     worker.terminate();
     if (this.worker === worker) this.worker = null;

@@ -1,36 +1,40 @@
 // Make: settings, a preview of the printed sheet, files, and their verification.
 import { dropZone, el, field, latest, save, select, settled } from "./dom";
-import { LibraryError, drawing, folding, proving } from "./library";
-import { type Settings, asked, isKind, isSolid, nameOf, ofTemplate, query, read, settled as settingsOf, template, PLACES, DEFAULT_FAMILY } from "./settings";
+import { LibraryError, drawing, folding } from "./library";
+import { type Format, proof } from "./proof";
+import { type Settings, PLACES, applies, asked, hasFiles, isBoard, isKind, isSolid, ofTemplate, query, read, settled as settingsOf, template } from "./settings";
 import { made } from "./shared";
 import type { Folding } from "./solid";
+import { type Known, targetForm } from "./target-form";
 import { templates } from "./templates";
 import { words } from "./words";
-import type { FamilyFacts, Pages } from "./worker";
+import type { Pages } from "./worker";
 
-/** Formats that the library writes, and their labels. */
-const formats: [string, string][] = [
-  ["pdf", "PDF"],
-  ["svg", "SVG"],
-  ["png", "PNG"],
-  ["json", "JSON"],
-  ["dsc", "DSC"],
+/** Formats that the library writes besides PDF, their labels, and the kinds of targets that have them. */
+const FORMATS: [string, string, (settings: Settings) => boolean][] = [
+  ["svg", "SVG", () => true],
+  ["png", "PNG", () => true],
+  ["json", "JSON", () => true],
+  ["laser-dxf", "DXF (laser)", () => true],
+  ["laser-svg", "SVG (laser)", () => true],
+  ["gltf", "GLB", ({ kind }) => kind !== "circles"],
+  ["obj", "OBJ", ({ kind }) => kind !== "circles"],
+  ["3mf", "3MF", ({ kind }) => kind !== "circles"],
+  ["stl", "STL", isSolid],
+  ["skeleton", "STL (skeleton)", (settings) => isSolid(settings) && settings.skeleton],
+  ["net", "DXF (net)", isSolid],
+  ["panels", "DXF (panels)", isSolid],
+  ["kalibr", "YAML (Kalibr)", ({ kind }) => kind === "aprilgrid"],
+  ["dsc", "DSC", (settings) => isBoard(settings) || isSolid(settings)],
 ];
-const solidFormats: [string, string][] = [
-  ["gltf", "GLB"],
-  ["obj", "OBJ"],
-  ["stl", "STL"],
-  ["net", "DXF (net)"],
-  ["panels", "DXF (panels)"],
-];
-/** The description is not verified: the other files are compared with it. */
-const PROVED_BY_ALL = "json";
+const PDF: Format = ["pdf", "PDF"];
+/** These are not verified: the other files are compared with the description, and Kalibr's file follows from it. */
+const NOT_PROVED = ["json", "kalibr", "skeleton"];
 const types: Record<string, string> = { pdf: "application/pdf", svg: "image/svg+xml", png: "image/png", json: "application/json" };
-/** Ids are 32-bit numbers. */
-const MAX_IDS = 2 ** 32 - 1;
-// list: papers (written by tests/it/files/lists.rs)
-const papers = ["A0", "A1", "A2", "A3", "A4", "A5", "letter", "legal", "tabloid"];
-// end of list
+/** Width and height of the smallest paper that is selected automatically. */
+const A4_MM = [210, 297];
+/** Time without a change before slow figures are computed, ms. */
+const IDLE_MS = 500;
 
 export function make(): HTMLElement {
   let settings: Settings = read(location.hash.split("?")[1] ?? "");
@@ -42,114 +46,54 @@ export function make(): HTMLElement {
   let folded: Folding | null = null;
   /** The settings of the solid shown. */
   let foldedOf = "";
-  let families: FamilyFacts[] = [];
-  let familyChoice: HTMLSelectElement;
+  let known: Known = { families: [], dictionaries: [] };
 
-  const form = el("form", { class: "form", submit: (event) => event.preventDefault() });
-  const picture = el("img", { class: "sheet", alt: words.make.preview });
+  const text = words.make;
+  // The build draws the default board.
+  const picture = el("img", { class: "sheet", alt: text.preview, src: import.meta.env.PROD && query(settings) === "" ? "./board.svg" : undefined });
   const solid = el("div", { class: "solid" });
-  const slider = el("input", { type: "range", min: 0, max: 100, value: 0, input: () => folded?.unfold(Number(slider.value) / 100) });
-  const fold = field(words.make.unfold, slider);
-  fold.hidden = true;
-  const making = el("p", { class: "busy", hidden: true }, words.make.making);
+  const slider = el("input", { type: "range", min: 0, max: 100, value: 0, input: () => (folded?.unfold(Number(slider.value) / 100), shown()) });
+  const play = el("button", { type: "button", click: () => folded?.play(Number(slider.value) < 50 ? 1 : 0, moved) }, text.play.unfold);
+  const fold = el("div", { class: "fold", hidden: true }, field(text.unfold, slider), play);
+  const making = el("p", { class: "busy", hidden: true }, text.making);
   const space = el("div", { hidden: true }, solid, fold, making);
   const problem = el("p", { class: "problem", role: "alert", hidden: true });
+  const sheets = el("p", { class: "sheets", "aria-live": "polite" });
   const facts = el("p", { class: "facts", "aria-live": "polite" });
-  const range = el("p", { class: "facts", "aria-live": "polite" });
+  const range = el("p", { class: "facts range", "aria-live": "polite" });
   const pager = el("p", { class: "pager" });
-  const views = el("p", { class: "pager" });
-  const downloads = el("div", { class: "buttons" });
-  const prover = el("button", { type: "button", class: "first", click: () => void prove() }, words.make.prove);
-  const verdict = el("div", { class: "verdict", "aria-live": "polite" });
-  const chooser = el("input", { type: "file", accept: ".toml,.json,.obj,.stl,.glb", hidden: true, change: () => void load([...(chooser.files ?? [])]) });
+  const views = el("p", { class: "pager views" });
+  const pdf = el("button", { type: "button", class: "first download", click: () => void download("pdf") }, text.pdf);
+  const others = el("dl", { class: "formats" });
+  const more = el("details", { class: "more", toggle: () => more.open && restart() }, el("summary", {}, text.formats), others);
+  const verification = proof(() => [PDF, ...(more.open ? formats().filter(([format]) => !NOT_PROVED.includes(format)) : [])]);
+  more.append(verification.lines);
+  const chooser = el("input", { type: "file", accept: ".toml,.json,.obj,.stl,.glb,.svg", hidden: true, change: () => void load([...(chooser.files ?? [])]) });
+  const choose = (accept: string) => {
+    chooser.accept = accept;
+    chooser.click();
+  };
+  const { kinds, form, fill: fillForm, showFamily } = targetForm({ changed, chooseMesh: () => choose(".obj,.stl,.glb"), chooseLogo: () => choose(".svg") });
 
-  const changed = (change: Partial<Settings>, isForm = false): void => {
+  function formats(): Format[] {
+    return FORMATS.flatMap(([format, label, has]): Format[] => (has(settings) ? [[format, label]] : []));
+  }
+
+  function changed(change: Partial<Settings>, isForm = false): void {
     settings = { ...settings, ...change };
     if (isForm) fill();
     draw();
-  };
-
-  function number(label: string, key: keyof Settings, least: number, most: number, usual?: string): HTMLElement {
-    const value = settings[key] as number | null;
-    const control = el("input", {
-      type: "number",
-      min: least,
-      max: most,
-      step: key.endsWith("_mm") || key === "tag_border" ? "any" : 1,
-      value: value ?? "",
-      placeholder: usual,
-      required: usual === undefined,
-      input: () => changed({ [key]: control.value === "" ? null : Number(control.value) } as Partial<Settings>),
-    });
-    return field(label, control);
-  }
-
-  function box(label: string, key: keyof Settings): HTMLElement {
-    const control = el("input", { type: "checkbox", change: () => changed({ [key]: control.checked } as Partial<Settings>) });
-    control.checked = settings[key] as boolean;
-    const whole = field(label, control);
-    whole.classList.add("box");
-    return whole;
   }
 
   function fill(): void {
-    const text = words.make;
-    const isSquare = settings.kind === "checker";
+    fillForm(settings, known);
+    others.replaceChildren(...formats().flatMap(([format, label]) => [el("dt", {}, el("button", { type: "button", click: () => void download(format) }, label)), el("dd", {}, text.about[format])]));
     const ofSolid = isSolid(settings);
-    const names = families.filter(({ kind }) => kind === (isSquare ? "checker" : "deltille")).map(({ name }) => name);
-    const options: [string, string][] = names.map((name) => [name, name]);
-    if (!isSquare) options.push([PLACES, text.places]);
-    options.push(["", text.noTags]);
-    const usualFamily = isSquare ? "" : DEFAULT_FAMILY;
-    // Keep a family from a link or template visible, even if it is unknown.
-    if (settings.family && !options.some(([name]) => name === settings.family)) options.push([settings.family, settings.family]);
-    const sizes = settings.paper === null || papers.includes(settings.paper) ? papers : [...papers, settings.paper];
-    familyChoice = select(options, settings.family ?? usualFamily, (family) => changed(family === PLACES ? { family, tag_spacing: null, first_id: 0 } : { family }, true));
-    const name = el("input", { type: "text", value: settings.name, input: () => changed({ name: name.value }) });
-    const isOpen = form.querySelector("details")?.open ?? false;
-    const isDense = settings.family === PLACES;
-    const hasTags = (settings.family ?? usualFamily) !== "";
-    const kinds = Object.entries(text.kinds).filter(([kind]) => kind !== "mesh" || settings.mesh !== null);
-    const measures = ofSolid
-      ? [number(text.solidEdge, "edge_mm", 1, 100_000, settings.kind === "mesh" ? text.usualEdge : text.usual), number(text.tiles, "tiles", 3, 200, text.usual)]
-      : [number(text.rows, "rows", 2, 500), number(text.cols, "cols", 2, 500), number(text.edge, "edge_mm", 1, 1000, text.fitting)];
-    const choose = (kind: string) => changed({ kind, family: null, edge_mm: null, name: settings.name === nameOf(settings.kind) ? nameOf(kind) : settings.name }, true);
-    form.replaceChildren(
-      field(text.kind, select(kinds, settings.kind, choose)),
-      ...measures,
-      field(text.family, familyChoice),
-      field(text.paper, select([["", text.smallest], ...sizes.map((paper) => [paper, paper] as [string, string])], settings.paper ?? "", (paper) => changed({ paper: paper || null }))),
-      field(text.name, name),
-      el(
-        "details",
-        { open: isOpen },
-        el("summary", {}, text.more),
-        field(text.orientation, select(Object.entries(text.orientations), settings.orientation, (orientation) => changed({ orientation }))),
-        number(text.margin, "margin_mm", 0, 100, text.usual),
-        ...(hasTags
-          ? [
-              ...(ofSolid || settings.kind === "deltille" ? [] : [field(text.tagsIn, select(Object.entries(text.tagsInColours), settings.tags_in, (tags_in) => changed({ tags_in })))]),
-              ...(isDense ? [] : [number(text.spacing, "tag_spacing", 1, 500, text.usual)]),
-              number(text.border, "tag_border", 0.6, 10, text.usual),
-              ...(isDense ? [] : [number(text.firstId, "first_id", 0, MAX_IDS)]),
-            ]
-          : []),
-        number(text.boardId, "board_id", 0, MAX_IDS),
-        box(text.inverted, "inverted"),
-        ...(ofSolid
-          ? [number(text.faceMargin, "face_margin_mm", 0, 1000, text.usual), box(text.skeleton, "skeleton"), box(text.perFace, "per_face"), box(text.allowSeams, "allow_seams")]
-          : [number(text.boards, "boards", 1, 500), box(text.poster, "poster"), box(text.packed, "packed")]),
-      ),
-    );
-    downloads.replaceChildren(
-      ...[...formats, ...(ofSolid ? solidFormats : [])].map(([format, text]) => el("button", { type: "button", click: () => void download(format) }, text)),
-    );
     views.replaceChildren(
-      ...(ofSolid
-        ? ([false, true] as const).map((space) => el("button", { type: "button", "aria-pressed": String(isTurning === space), click: () => turn(space) }, space ? text.view.solid : text.view.sheet))
-        : []),
+      ...(ofSolid ? [false, true].map((isOn) => el("button", { type: "button", "aria-pressed": String(isOn === isTurning), click: () => turn(isOn) }, isOn ? text.view.solid : text.view.sheet)) : []),
     );
-    link.hidden = settings.kind === "mesh";
+    link.hidden = hasFiles(settings);
+    seeIt.hidden = settings.kind === "circles";
     if (!ofSolid && isTurning) turn(false);
   }
 
@@ -170,10 +114,13 @@ export function make(): HTMLElement {
       const [{ showMesh }, { glb, hinges }] = await Promise.all([import("./solid"), folding.call("solid", of)]);
       if (of !== asked(settings)) return;
       folded?.end();
-      folded = await showMesh(solid, glb, hinges, words.make.solidView);
+      folded = await showMesh(solid, glb, hinges, text.solidView);
+      // The first time, the net folds into the solid.
+      const isFirst = foldedOf === "" && hinges.length > 0;
       foldedOf = of;
       fold.hidden = hinges.length === 0;
-      folded.unfold(Number(slider.value) / 100);
+      folded.unfold(isFirst ? 1 : Number(slider.value) / 100);
+      if (isFirst) folded.play(0, moved);
     } catch (error) {
       // Drawing the sheet reports wrong settings.
       if (pages && of === asked(settings)) showError(error);
@@ -182,9 +129,19 @@ export function make(): HTMLElement {
     }
   });
 
+  /** Follows the motion of the net. */
+  function moved(part: number): void {
+    slider.value = String(Math.round(100 * part));
+    shown();
+  }
+
+  function shown(): void {
+    play.textContent = Number(slider.value) < 50 ? text.play.unfold : text.play.fold;
+  }
+
   function showError(error: unknown): void {
-    const text = error instanceof Error ? error.message : String(error);
-    problem.textContent = text || words.failed;
+    const message = error instanceof Error ? error.message : String(error);
+    problem.textContent = message || words.failed;
     problem.hidden = false;
   }
 
@@ -193,7 +150,7 @@ export function make(): HTMLElement {
     const wrong = [...numbers].find((control) => !control.validity.valid);
     const details = wrong?.closest("details");
     if (details) details.open = true;
-    return wrong && words.make.mistaken(wrong.labels?.[0]?.textContent ?? "", Number(wrong.min), Number(wrong.max), wrong.step !== "any");
+    return wrong && text.mistaken(wrong.labels?.[0]?.textContent ?? "", Number(wrong.min), Number(wrong.max), wrong.step !== "any");
   }
 
   const redraw = latest(async (isStale) => {
@@ -204,6 +161,7 @@ export function make(): HTMLElement {
       if (mistake) throw new LibraryError(mistake);
       show(await drawing.call("draw", of));
       if (isTurning && !isStale()) void showSolid();
+      if (!isStale()) restart();
     } catch (error) {
       if (isStale()) return;
       show(null);
@@ -212,26 +170,32 @@ export function make(): HTMLElement {
   });
 
   function draw(): void {
-    verdict.replaceChildren();
+    verification.restart(null);
     void redraw();
+  }
+
+  /** Verifies what is drawn. */
+  function restart(): void {
+    verification.restart(pages ? asked(settings) : null);
   }
 
   /** Shows the sheet that was drawn, or null after an error. */
   function show(drawn: Pages | null): void {
     pages = drawn;
     picture.classList.toggle("past", !drawn);
-    for (const button of [prover, ...downloads.querySelectorAll("button")]) button.disabled = !drawn;
+    for (const button of [pdf, ...others.querySelectorAll("button")]) button.disabled = !drawn;
     if (!drawn) {
-      facts.textContent = range.textContent = "";
+      for (const part of [sheets, facts, range]) part.textContent = "";
       return;
     }
     made.json = drawn.json;
     made.name = settings.name;
+    made.family = applies("family_file", settings) ? settings.family_file : null;
     problem.hidden = true;
     turnTo(Math.min(at, drawn.pages.length - 1));
     showFacts(drawn);
     // Do not rebuild the form: the user may be typing in it.
-    if (settings.family === null) familyChoice.value = drawn.family ?? "";
+    if (settings.family === null && drawn.family) showFamily(drawn.family);
   }
 
   const address = settled(() => {
@@ -254,19 +218,40 @@ export function make(): HTMLElement {
     pager.replaceChildren(
       ...(count > 1
         ? [
-            el("button", { type: "button", "aria-label": words.make.before, click: step(-1) }, "‹"),
-            words.make.page(at + 1, count),
-            el("button", { type: "button", "aria-label": words.make.after, click: step(1) }, "›"),
+            el("button", { type: "button", "aria-label": text.before, click: step(-1) }, "‹"),
+            text.page(at + 1, count),
+            el("button", { type: "button", "aria-label": text.after, click: step(1) }, "›"),
           ]
         : []),
     );
   }
 
-  function showFacts({ pages, reach, family }: Pages): void {
-    facts.textContent = words.make.facts(reach.corners, reach.tags, pages.length);
-    if (reach.tags > 0 && family !== PLACES) facts.textContent += ` ${words.make.idsLeft(reach.ids_left, family ?? "")}`;
+  function showFacts(drawn: Pages): void {
+    const { reach, family } = drawn;
+    facts.textContent = text.facts(reach.corners, reach.tags);
+    if (reach.tags > 0 && family && family !== PLACES) facts.textContent += ` ${text.idsLeft(reach.ids_left, family)}`;
+    showSheets(drawn);
     void showRange();
   }
+
+  /** States the paper and the edge, and for larger paper the number of A4 pages. */
+  function showSheets(drawn: Pages): void {
+    if (!drawn.sheets) return void (sheets.textContent = "");
+    const { paper, size_mm, pages: count, edge_mm } = drawn.sheets;
+    const noun = ({ charuco: "square", aprilgrid: "tag", circles: "spacing" } as const)[settings.kind] ?? "tile";
+    const said = text.sheets(paper, size_mm, count, edge_mm === null ? "" : text.edgeOf[noun](edge_mm));
+    sheets.textContent = `${said}.`;
+    const isLarger = [...size_mm].sort((a, b) => a - b).some((side, i) => side > (A4_MM[i] ?? 0));
+    const use = () => changed({ paper: "A4", orientation: "auto", ...(edge_mm === null ? {} : { edge_mm }), ...(isBoard(settings) ? { poster: true } : {}) }, true);
+    if (isLarger) showA4(drawn, said, el("button", { type: "button", class: "quiet", click: use }, text.useA4));
+  }
+
+  /** Laying out the net of an icosahedron on small paper takes a second. */
+  const showA4 = settled(async (drawn: Pages, said: string, use: HTMLElement) => {
+    if (drawn !== pages) return;
+    const count = await folding.call("pagesOnA4", asked(settings)).catch(() => null);
+    if (drawn === pages && count !== null) sheets.replaceChildren(`${said}${text.fitsOnA4(count)}. `, use);
+  }, IDLE_MS);
 
   /** Shows the working range of a camera, as computed by the library. */
   async function showRange(): Promise<void> {
@@ -279,50 +264,17 @@ export function make(): HTMLElement {
     const found = await drawing.call("distances", asked(settings), Number(view.value), Number(pixels.value)).catch(() => undefined);
     if (found === undefined || reach !== pages?.reach) return;
     const length = (mm: number) => (mm >= 1000 ? `${(mm / 1000).toFixed(1)} m` : `${(mm / 10).toFixed(0)} cm`);
-    range.textContent = found ? words.make.range(length(found[0]), length(found[1]), reach.tags > 0) : words.make.never;
+    range.textContent = found ? text.range(length(found[0]), length(found[1]), reach.tags > 0) : text.never;
   }
 
   async function download(format: string): Promise<void> {
     try {
-      const files = await drawing.call("files", asked(settings), format);
+      // The others may take long, or need a large module.
+      const files = await (format === "pdf" ? drawing : folding).call("files", asked(settings), format);
       for (const { name, bytes } of files) save(name, bytes as Uint8Array<ArrayBuffer>, types[format]);
     } catch (error) {
       showError(error);
     }
-  }
-
-  /** Verifies all files, each with the line that `deltille verify` prints. */
-  async function prove(): Promise<void> {
-    const of = asked(settings);
-    const lines = el("ul", { class: "lines" });
-    const all = [...formats, ...(isSolid(settings) ? solidFormats : [])].filter(([format]) => format !== PROVED_BY_ALL);
-    const sum = el("p", { class: "busy" }, words.make.proving(0, all.length));
-    verdict.replaceChildren(sum, lines);
-    prover.disabled = true;
-    let failed = false;
-    let count = 0;
-    for (const [index, [format, name]] of all.entries()) {
-      try {
-        const proof = await proving.call("prove", of, format);
-        if (of !== asked(settings)) return;
-        count += proof.files;
-        if (!proof.passed) failed = true;
-        const findings = proof.sentences.map((sentence) => el("li", {}, sentence));
-        lines.append(el("li", { class: proof.passed ? "passed" : "refused" }, proof.line, findings.length > 0 ? el("ul", {}, ...findings) : ""));
-      } catch (error) {
-        if (of !== asked(settings)) return;
-        // A message of the library says why this file does not exist. If there is no message, the library crashed, and
-        // nothing is verified.
-        const reason = error instanceof LibraryError ? error.message : "";
-        if (!reason) failed = true;
-        lines.append(el("li", { class: reason ? "plain" : "refused" }, `${name}: ${reason || words.failed}`));
-      }
-      sum.textContent = words.make.proving(index + 1, all.length);
-    }
-    prover.disabled = false;
-    const isProved = !failed && count > 0;
-    sum.className = isProved ? "good" : "bad";
-    sum.textContent = isProved ? words.make.proved(count) : words.make.notProved;
   }
 
   async function load(files: File[]): Promise<void> {
@@ -337,30 +289,36 @@ export function make(): HTMLElement {
         turn(true);
         return;
       }
-      const text = await file.text();
-      settings = /\.toml$/i.test(file.name) ? ofTemplate(text) : ofValues(text);
+      const content = await file.text();
+      if (/\.svg$/i.test(file.name)) return changed({ logo: await folding.call("logo", content) }, true);
+      const read = /\.toml$/i.test(file.name) ? ofTemplate(content) : ofValues(content, file.name);
+      settings = read;
       fill();
       draw();
     } catch (error) {
-      showError(new LibraryError(`${file.name}: ${error instanceof SyntaxError || !(error instanceof Error) ? words.make.noSettings : error.message}`));
+      showError(new LibraryError(`${file.name}: ${error instanceof SyntaxError || !(error instanceof Error) ? text.noSettings : error.message}`));
     }
   }
 
-  function ofValues(text: string): Settings {
-    const values = JSON.parse(text) as Record<string, unknown>;
-    if (typeof values !== "object" || values === null) throw new Error(words.make.noSettings);
-    if ("schema" in values) throw new Error(words.make.isDescription);
-    if (!isKind(values.kind)) throw new Error(words.make.noSettings);
+  /** The settings in a JSON file; of a family file, the current ones with this family. */
+  function ofValues(content: string, name: string): Settings {
+    const values = JSON.parse(content) as Record<string, unknown>;
+    if (typeof values !== "object" || values === null) throw new Error(text.noSettings);
+    if (String(values.schema).startsWith("deltille/family/")) return { ...settings, family: name, family_file: content };
+    if ("schema" in values) throw new Error(text.isDescription);
+    if (!isKind(values.kind)) throw new Error(text.noSettings);
     const given = Object.entries(values).filter(([, value]) => value !== null);
     return settingsOf(given.map(([key, value]) => [key, String(value)]));
   }
 
+  /** Saves the settings: those of a board as a template of the program. */
   function store(): void {
-    if (isSolid(settings)) save(`${settings.name}.settings.json`, JSON.stringify(settings, null, 2), "application/json");
-    else save(`${settings.name}.toml`, template(settings), "application/toml");
+    const isTemplate = isBoard(settings) && !hasFiles(settings) && !settings.mirrored && settings.kerf_mm === null;
+    if (isTemplate) save(`${settings.name}.toml`, template(settings), "application/toml");
+    else save(`${settings.name}.settings.json`, JSON.stringify(settings, null, 2), "application/json");
   }
 
-  const link = el("button", { type: "button", click: () => void copy() }, words.make.link);
+  const link = el("button", { type: "button", click: () => void copy() }, text.link);
   async function copy(): Promise<void> {
     const of = query(settings);
     const url = new URL(location.href);
@@ -370,13 +328,14 @@ export function make(): HTMLElement {
       history.replaceState(null, "", url);
       addressed = location.hash;
     }
-    link.textContent = isCopied ? words.make.copied : words.make.inAddress;
-    setTimeout(() => (link.textContent = words.make.link), 3000);
+    link.textContent = isCopied ? text.copied : text.inAddress;
+    setTimeout(() => (link.textContent = text.link), 3000);
   }
 
+  const seeIt = el("a", { class: "button", href: "#see", click: () => (made.isWanted = true) }, text.seeIt);
   const view = el("input", { type: "number", min: 1, max: 170, value: 60, step: "any", required: true, input: () => void showRange() });
   const pixels = el("input", { type: "number", min: 64, max: 20_000, value: 1920, required: true, input: () => void showRange() });
-  const offered = select([["", words.make.noTemplate], ...templates.map(({ name }) => [name, name] as [string, string])], "", (name) => {
+  const offered = select([["", text.noTemplate], ...templates.map(({ name }) => [name, name] as [string, string])], "", (name) => {
     const chosen = templates.find((template) => template.name === name);
     if (!chosen) return;
     settings = ofTemplate(chosen.text);
@@ -399,42 +358,45 @@ export function make(): HTMLElement {
   });
   fill();
   draw();
-  drawing.call("families").then((all) => {
-    families = all;
+  Promise.all([drawing.call("families"), drawing.call("dictionaries")]).then(([families, dictionaries]) => {
+    known = { families, dictionaries };
     fill();
   }, showError);
 
   return el(
     "section",
     { class: "make", "aria-label": words.tabs.make },
-    el("p", { class: "lead" }, words.make.lead),
+    el("h2", { class: "title" }, text.title),
+    el("p", { class: "lead" }, text.lead),
+    kinds,
     el(
       "div",
-      { class: "columns" },
+      { class: "bench" },
       el(
         "div",
-        { class: "settings" },
-        field(words.make.templates, offered),
+        {},
         form,
-        el("fieldset", {}, el("legend", {}, words.make.camera), field(words.make.fieldOfView, view), field(words.make.pixels, pixels)),
-        dropZone((files) => void load(files), el("p", {}, words.make.drop), el("div", { class: "buttons" }, el("button", { type: "button", click: () => chooser.click() }, words.make.load)), chooser),
+        el(
+          "div",
+          { class: "rest" },
+          el("fieldset", {}, el("legend", {}, text.camera), field(text.fieldOfView, view), field(text.pixels, pixels)),
+          field(text.templates, offered),
+          dropZone((files) => void load(files), el("p", {}, text.drop), el("div", { class: "buttons" }, el("button", { type: "button", click: () => choose(".toml,.json,.obj,.stl,.glb,.svg") }, text.load)), chooser),
+        ),
       ),
       el(
         "div",
-        { class: "stage" },
-        problem,
-        views,
-        picture,
-        space,
-        pager,
-        facts,
-        range,
-        el("p", { class: "printed" }, words.make.printed),
-        el("h2", {}, words.make.download),
-        downloads,
-        el("div", { class: "buttons" }, prover, el("a", { class: "button", href: "#see", click: () => (made.isWanted = true) }, words.make.seeIt)),
-        verdict,
-        el("div", { class: "buttons quiet" }, link, el("button", { type: "button", click: store }, words.make.template)),
+        {},
+        el("div", { class: "stage" }, problem, views, el("div", { class: "board" }, picture, space), pager, sheets, facts, range, el("p", { class: "printed" }, text.printed)),
+        el(
+          "div",
+          { class: "get" },
+          el("div", { class: "buttons" }, pdf, verification.state),
+          el("p", { class: "hint" }, text.printing),
+          more,
+          el("div", { class: "buttons" }, seeIt),
+          el("div", { class: "buttons quiet" }, link, el("button", { type: "button", click: store }, text.template)),
+        ),
       ),
     ),
   );

@@ -3,6 +3,7 @@ import { dropZone, el, field, save, select } from "./dom";
 import { LibraryError, drawing, looking } from "./library";
 import { type Sample, samples } from "./samples";
 import { asked, usual } from "./settings";
+import { photographPicture } from "./pictures";
 import { made, seen, stem } from "./shared";
 import { words } from "./words";
 import type { Recognised, Shown, Sought } from "./worker";
@@ -19,6 +20,7 @@ type Photo = {
   ink: unknown;
   result: Shown | null;
   found: Detection | null;
+  thumb: HTMLCanvasElement | null;
   error: string;
 };
 type BoardSpec = {
@@ -35,8 +37,10 @@ type BoardSpec = {
 const MAGNIFIED = 24;
 /** Size of the ellipses, in standard deviations. */
 const ELLIPSE = 100;
-/** File formats of the results. */
+/** File formats of the results; the last is behind “More formats”. */
 const RESULTS = ["json", "csv", "orpc"] as const;
+/** Width and height of a thumbnail, px. */
+const THUMB = [128, 96] as const;
 const COLOURS = ["#0a84ff", "#ff9f0a", "#30d158", "#ff453a", "#bf5af2", "#64d2ff"];
 
 const photoOf = (name: string, key: string, bytes: () => Promise<ArrayBuffer>): Photo => ({
@@ -47,8 +51,33 @@ const photoOf = (name: string, key: string, bytes: () => Promise<ArrayBuffer>): 
   ink: null,
   result: null,
   found: null,
+  thumb: null,
   error: "",
 });
+
+/** A small copy of a photograph, cropped to one aspect ratio; each pixel is the mean of those that it replaces. */
+function thumbnail({ width, height, grey }: Shown): HTMLCanvasElement {
+  const [wide, high] = THUMB;
+  const step = Math.min(width / wide, height / high);
+  const [left, top] = [(width - step * wide) / 2, (height - step * high) / 2];
+  const canvas = el("canvas", { class: "thumb", width: wide, height: high, "aria-hidden": "true" });
+  const shades = new ImageData(wide, high);
+  for (let j = 0; j < high; j++) {
+    for (let i = 0; i < wide; i++) {
+      let [sum, count] = [0, 0];
+      for (let y = Math.floor(top + j * step); y < Math.max(top + (j + 1) * step, top + j * step + 1) && y < height; y++) {
+        for (let x = Math.floor(left + i * step); x < Math.max(left + (i + 1) * step, left + i * step + 1) && x < width; x++) {
+          sum += grey[y * width + x] ?? 0;
+          count += 1;
+        }
+      }
+      const shade = sum / Math.max(count, 1);
+      shades.data.set([shade, shade, shade, 255], 4 * (j * wide + i));
+    }
+  }
+  canvas.getContext("2d")?.putImageData(shades, 0, 0);
+  return canvas;
+}
 
 export function see(): HTMLElement {
   /** The target searched for; null until it is chosen or identified. */
@@ -93,13 +122,14 @@ export function see(): HTMLElement {
   const options = el("div", {});
   const known = el("div", { "aria-live": "polite" });
   let described: { name: string; json: string } | null = null;
+  let isMoreOpen = false;
 
   function choose(value: string): void {
     choice = value;
     recognised = null;
     known.replaceChildren();
     if (value === "auto") sought = null;
-    else if (value === "made") sought = { target: made.json };
+    else if (value === "made") sought = { target: made.json, family: made.family };
     else if (value === "described" && described) sought = { target: described.json };
     else sought = { grid: value };
     again();
@@ -196,6 +226,7 @@ export function see(): HTMLElement {
         const result = await looking.call("photograph", of, null, photo.name, await photo.bytes());
         if (turn !== asking) return;
         photo.result = result;
+        photo.thumb ??= thumbnail(result);
         photo.found = JSON.parse(result.json) as Detection;
         photo.ink = photo.found.ink ?? null;
         photo.of = seen.sought = of;
@@ -285,6 +316,12 @@ export function see(): HTMLElement {
     return corners === 0 ? words.see.none : words.see.found(corners, tags);
   }
 
+  function stateOf(photo: Photo): "failed" | "looking" | "missing" | "found" {
+    if (photo.error) return "failed";
+    if (!photo.found) return "looking";
+    return photo.found.grids.some((grid) => grid.corners.length > 0) ? "found" : "missing";
+  }
+
   function pick(index: number): void {
     at = index;
     draw();
@@ -298,7 +335,12 @@ export function see(): HTMLElement {
         el(
           "li",
           {},
-          el("button", { type: "button", "aria-pressed": index === at ? "true" : "false", click: () => pick(index) }, el("strong", {}, photo.name), ` ${figures(photo)}`),
+          el(
+            "button",
+            { type: "button", "aria-pressed": index === at ? "true" : "false", class: stateOf(photo), click: () => pick(index) },
+            photo.thumb ?? el("span", { class: "thumb" }),
+            el("span", {}, el("strong", {}, photo.name), " ", el("span", { class: "figures-of" }, figures(photo))),
+          ),
         ),
       ),
       ...(photos.length > 0
@@ -313,9 +355,11 @@ export function see(): HTMLElement {
         : []),
     );
     heading.hidden = photos.length === 0;
-    invitation.hidden = at >= 0;
-    invitation.textContent = photos.length > 0 ? words.see.looking : words.see.empty;
-    invitation.classList.toggle("busy", photos.length > 0);
+    empty.hidden = photos.length > 0;
+    waiting.hidden = photos.length === 0 || at >= 0;
+    const usable = photos.filter(({ found }) => found?.grids.some(({ panel }) => panel !== null)).length;
+    next.hidden = usable === 0;
+    next.textContent = words.see.next(usable);
   }
 
   function removeThis(): void {
@@ -402,10 +446,9 @@ export function see(): HTMLElement {
     status.textContent = [`${figures(photo)}, ${words.see.time(ms)}.`, ...reasons.map((reason) => `${reason.charAt(0).toUpperCase()}${reason.slice(1)}${reason.endsWith("?") ? "" : "."}`)].join(" ");
     hint.hidden = photo.found.grids.length === 0;
     hint.textContent = words.see.magnifier;
-    downloads.replaceChildren(
-      ...RESULTS.map((format) => el("button", { type: "button", click: () => save(`${stem(photo.name)}.${format}`, photo.result?.[format] ?? "") }, format.toUpperCase())),
-      el("button", { type: "button", click: () => void overlay(photo) }, words.see.overlay),
-    );
+    const [first, second, other] = RESULTS.map((format) => el("button", { type: "button", click: () => save(`${stem(photo.name)}.${format}`, photo.result?.[format] ?? "") }, format.toUpperCase()));
+    const more = el("details", { open: isMoreOpen, toggle: () => (isMoreOpen = more.open) }, el("summary", {}, words.see.more), other);
+    downloads.replaceChildren(first ?? "", second ?? "", el("button", { type: "button", click: () => void overlay(photo) }, words.see.overlay), more);
   }
 
   async function overlay(photo: Photo): Promise<void> {
@@ -493,7 +536,9 @@ export function see(): HTMLElement {
 
   const frame = el("div", { class: "frame" }, canvas, lens);
   const heading = el("h2", {}, words.see.list);
-  const invitation = el("p", { class: "empty" }, words.see.empty);
+  const waiting = el("p", { class: "busy" }, words.see.looking);
+  const empty = el("div", { class: "empty" }, photographPicture(), el("p", {}, words.see.empty), el("ol", {}, ...words.see.steps.map((step) => el("li", {}, step))));
+  const next = el("a", { class: "button first", href: "#calibrate", hidden: true });
   /** Updates the choices, as the target of “Make” may have changed while this part was hidden. */
   function shown(): void {
     if (!location.hash.startsWith("#see")) return;
@@ -509,7 +554,8 @@ export function see(): HTMLElement {
   return el(
     "section",
     { class: "see", "aria-label": words.tabs.see },
+    el("h2", { class: "title" }, words.see.title),
     el("p", { class: "lead" }, words.see.lead),
-    el("div", { class: "columns" }, el("div", { class: "settings" }, zone, options, known, heading, list, inked), el("div", { class: "stage" }, problem, invitation, frame, status, hint, downloads, credit)),
+    el("div", { class: "columns" }, el("div", { class: "settings" }, zone, options, known, heading, list, inked), el("div", { class: "stage" }, problem, empty, waiting, frame, status, hint, downloads, next, credit)),
   );
 }

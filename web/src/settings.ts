@@ -4,14 +4,25 @@ export type Settings = {
   rows: number;
   cols: number;
   edge_mm: number | null;
+  marker_mm: number | null;
+  legacy: boolean;
+  gap: number | null;
+  diameter_mm: number | null;
+  asymmetric: boolean;
+  size: string | null;
   family: string | null;
+  /** The text of a family file that is not bundled. */
+  family_file: string | null;
   tags_in: string;
   tag_spacing: number | null;
   tag_border: number | null;
+  hole_mm: number | null;
   first_id: number;
+  tag_ids: boolean;
   board_id: number;
   boards: number;
   inverted: boolean;
+  two_sided_mm: number | null;
   tiles: number | null;
   face_margin_mm: number | null;
   skeleton: boolean;
@@ -22,6 +33,13 @@ export type Settings = {
   paper: string | null;
   orientation: string;
   margin_mm: number | null;
+  guide_page: boolean;
+  note: string | null;
+  /** The outline of a logo, as the library reads it from an SVG. */
+  logo: string | null;
+  logo_height_mm: number | null;
+  mirrored: boolean;
+  kerf_mm: number | null;
   name: string;
   /** The text of an OBJ file. */
   mesh: string | null;
@@ -32,14 +50,24 @@ export const usual: Settings = {
   rows: 10,
   cols: 11,
   edge_mm: null,
+  marker_mm: null,
+  legacy: false,
+  gap: null,
+  diameter_mm: null,
+  asymmetric: false,
+  size: null,
   family: null,
+  family_file: null,
   tags_in: "black",
   tag_spacing: null,
   tag_border: null,
+  hole_mm: null,
   first_id: 0,
+  tag_ids: false,
   board_id: 0,
   boards: 1,
   inverted: false,
+  two_sided_mm: null,
   tiles: null,
   face_margin_mm: null,
   skeleton: false,
@@ -50,43 +78,112 @@ export const usual: Settings = {
   paper: null,
   orientation: "auto",
   margin_mm: null,
+  guide_page: false,
+  note: null,
+  logo: null,
+  logo_height_mm: null,
+  mirrored: false,
+  kerf_mm: null,
   name: "board",
   mesh: null,
 };
 
-const OF_BOARDS = ["rows", "cols", "tags_in", "boards", "poster", "packed"] as const;
-const OF_SOLIDS = ["tiles", "face_margin_mm", "skeleton", "per_face", "allow_seams"] as const;
+/** Rows and columns of kinds other than boards, which fit on A4. */
+const SIZES: Record<string, { rows: number; cols: number }> = { charuco: { rows: 6, cols: 9 }, aprilgrid: { rows: 5, cols: 7 }, circles: { rows: 7, cols: 9 } };
+
+const BOARDS = ["deltille", "checker"];
+const GRIDS = ["charuco", "aprilgrid", "circles"];
+const SOLIDS = ["tetrahedron", "octahedron", "icosahedron", "cube", "cuboid", "mesh"];
+export const KINDS = [...BOARDS, ...GRIDS, ...SOLIDS];
+const FLAT = [...BOARDS, ...GRIDS];
+const TAGGED = KINDS.filter((kind) => kind !== "circles");
+
+/** The kinds to which a setting applies; the others apply to all. */
+const APPLIES: Partial<Record<keyof Settings, string[]>> = {
+  rows: FLAT,
+  cols: FLAT,
+  edge_mm: KINDS.filter((kind) => kind !== "cuboid"),
+  marker_mm: ["charuco"],
+  legacy: ["charuco"],
+  gap: ["aprilgrid"],
+  diameter_mm: ["circles"],
+  asymmetric: ["circles"],
+  size: ["cuboid"],
+  family: TAGGED,
+  family_file: TAGGED,
+  tags_in: ["checker"],
+  tag_spacing: [...BOARDS, ...SOLIDS],
+  tag_border: [...BOARDS, ...SOLIDS, "aprilgrid"],
+  hole_mm: ["deltille", "tetrahedron", "octahedron", "icosahedron", "mesh"],
+  first_id: TAGGED,
+  tag_ids: [...BOARDS, ...SOLIDS],
+  boards: BOARDS,
+  inverted: [...BOARDS, ...SOLIDS],
+  two_sided_mm: BOARDS,
+  tiles: SOLIDS,
+  face_margin_mm: SOLIDS,
+  skeleton: SOLIDS,
+  per_face: SOLIDS,
+  allow_seams: SOLIDS,
+  poster: BOARDS,
+  packed: BOARDS,
+  mirrored: FLAT,
+  mesh: ["mesh"],
+};
+/** Settings that are too long for an address. */
+const LONG = ["mesh", "logo", "family_file"] as const;
+
 /** Allowed values of some settings. */
 const CHOICES: Record<string, string[]> = {
-  kind: ["deltille", "checker", "icosahedron", "octahedron", "tetrahedron", "mesh"],
+  kind: KINDS,
   tags_in: ["black", "white"],
   orientation: ["auto", "portrait", "landscape"],
 };
-const NUMBERS = ["rows", "cols", "edge_mm", "tag_spacing", "tag_border", "first_id", "board_id", "boards", "tiles", "face_margin_mm", "margin_mm"];
+const NUMBERS = ["rows", "cols", "edge_mm", "marker_mm", "gap", "diameter_mm", "tag_spacing", "tag_border", "hole_mm", "first_id", "board_id", "boards", "two_sided_mm", "tiles", "face_margin_mm", "margin_mm", "logo_height_mm", "kerf_mm"];
 
-/** The default tag family. */
+/** The default tag family, and those of other kinds. */
 export const DEFAULT_FAMILY = "delTag25h7";
+const DEFAULT_FAMILIES: Record<string, string> = { checker: "", charuco: "DICT_5X5_100", aprilgrid: "aprilTag36h11", cube: "aprilTag36h11", cuboid: "aprilTag36h11" };
 
 /** The family of position codes, one in every upright tile. */
 export const PLACES = "dense9";
 
-export const isSolid = (settings: Settings): boolean => settings.kind !== "deltille" && settings.kind !== "checker";
+export const isBoard = ({ kind }: Settings): boolean => BOARDS.includes(kind);
+export const isSolid = ({ kind }: Settings): boolean => SOLIDS.includes(kind);
+export const hasSquareTags = ({ kind }: Settings): boolean => ["checker", "aprilgrid", "cube", "cuboid"].includes(kind);
+export const applies = (key: keyof Settings, { kind }: Settings): boolean => APPLIES[key]?.includes(kind) ?? true;
+export const usualFamily = (kind: string): string => DEFAULT_FAMILIES[kind] ?? DEFAULT_FAMILY;
+
+/** Whether settings contain files, so that neither an address nor a template contains all of them. */
+export const hasFiles = (settings: Settings): boolean => LONG.some((key) => settings[key] !== null && applies(key, settings));
 
 /** The default name of a kind of target. */
 export const nameOf = (kind: string): string => ({ deltille: "board", checker: "checkerboard", mesh: "solid" })[kind] ?? kind;
 
+/** The default settings of a kind of target. */
+export const usualOf = (kind: string): Settings => ({ ...usual, ...SIZES[kind], kind, name: nameOf(kind) });
+
+/** Settings after a change of the kind: those that had their defaults get the new ones. */
+export function ofKind(kind: string, settings: Settings): Settings {
+  const [before, after] = [usualOf(settings.kind), usualOf(kind)];
+  const isUsual = settings.rows === before.rows && settings.cols === before.cols;
+  const { rows, cols } = isUsual ? after : settings;
+  return { ...settings, kind, rows, cols, family: null, family_file: null, edge_mm: null, name: settings.name === before.name ? after.name : settings.name };
+}
+
 /** Settings that differ from the defaults, as a query; empty for a mesh, which is too long for an address. */
 export function query(settings: Settings): string {
   if (settings.kind === "mesh") return "";
-  const without: Settings = { ...usual, name: nameOf(settings.kind), mesh: settings.mesh };
-  const pairs = Object.entries(settings).filter(([key, value]) => value !== without[key as keyof Settings]);
+  const without: Settings = { ...usualOf(settings.kind), kind: usual.kind };
+  const pairs = Object.entries(settings).filter(([key, value]) => value !== without[key as keyof Settings] && !(LONG as readonly string[]).includes(key));
   return new URLSearchParams(pairs.map(([key, value]) => [key, String(value)])).toString();
 }
 
 /** Settings from named values; missing and invalid ones keep their defaults. */
 export function settled(values: Iterable<[string, string]>): Settings {
-  const found: Record<string, unknown> = { ...usual };
   const all = new Map(values);
+  const kind = all.get("kind") ?? "";
+  const found: Record<string, unknown> = { ...usualOf(isKind(kind) ? kind : usual.kind) };
   for (const [key, value] of all) {
     if (!(key in usual)) continue;
     const before = usual[key as keyof Settings];
@@ -94,8 +191,7 @@ export function settled(values: Iterable<[string, string]>): Settings {
     else if (NUMBERS.includes(key)) found[key] = value !== "" && Number.isFinite(Number(value)) ? Number(value) : before;
     else if (!CHOICES[key] || CHOICES[key].includes(value)) found[key] = value;
   }
-  const settings = found as Settings;
-  return all.has("name") ? settings : { ...settings, name: nameOf(settings.kind) };
+  return found as Settings;
 }
 
 /** The settings of an address, which cannot contain a mesh. */
@@ -104,14 +200,12 @@ export function read(text: string): Settings {
   return found.kind === "mesh" ? usual : found;
 }
 
-export const isKind = (kind: unknown): boolean => CHOICES.kind?.includes(String(kind)) ?? false;
+export const isKind = (kind: unknown): boolean => KINDS.includes(String(kind));
 
 /** The settings for the library, without those that do not apply to this kind of target. */
 export function asked(settings: Settings): string {
-  const own: Partial<Settings> = { ...settings };
-  for (const key of isSolid(settings) ? OF_BOARDS : OF_SOLIDS) delete own[key];
-  if (settings.kind !== "mesh") delete own.mesh;
-  return JSON.stringify(own);
+  const own = Object.entries(settings).filter(([key]) => applies(key as keyof Settings, settings));
+  return JSON.stringify(Object.fromEntries(own));
 }
 
 // Templates of the command-line programs: flat TOML, one setting per line.
@@ -126,15 +220,21 @@ const KEYS: [string, keyof Settings][] = [
   ["tags-in", "tags_in"],
   ["tag-spacing", "tag_spacing"],
   ["tag-border", "tag_border"],
+  ["hole", "hole_mm"],
   ["first-id", "first_id"],
+  ["tag-ids", "tag_ids"],
   ["board-id", "board_id"],
   ["boards", "boards"],
   ["invert", "inverted"],
+  ["two-sided", "two_sided_mm"],
   ["poster", "poster"],
   ["pack", "packed"],
   ["paper", "paper"],
   ["orientation", "orientation"],
   ["margin", "margin_mm"],
+  ["guide-page", "guide_page"],
+  ["note", "note"],
+  ["logo-height", "logo_height_mm"],
 ];
 const OTHERS = ["command", "untagged", "dense", "pdf", "svg", "png", "dsc", "dsc-dialect", "dpi"];
 const UNITS: Record<string, number> = { "": 1, mm: 1, cm: 10, m: 1000, in: 25.4 };
@@ -152,6 +252,7 @@ export function ofTemplate(text: string): Settings {
     if (table !== "") throw new Error(`[${table}]: the page does not support this table; use the template with the command-line program`);
     const [, key = "", string, plain] = /^([\w-]+)\s*=\s*(?:"([^"]*)"|([\w.+-]+))\s*(?:#.*)?$/.exec(bare) ?? [];
     const known = KEYS.find(([name]) => name === key)?.[1];
+    if (key === "logo") throw new Error(`logo: the page cannot read ${string ?? plain}; remove this line, and choose the logo in the form`);
     if (!known && !OTHERS.includes(key)) throw new Error(key === "" ? `${bare}: not a setting` : `${key}: unknown setting`);
     const value = string ?? plain ?? "";
     if (key === "command") values.set("kind", value === "checkerboard" ? "checker" : "deltille");

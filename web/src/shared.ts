@@ -2,7 +2,7 @@
 import type { Sought } from "./worker";
 
 /** The target of “Make”, and whether “Detect” should search for it. */
-export const made = { json: "", name: "", isWanted: false };
+export const made: { json: string; name: string; family: string | null; isWanted: boolean } = { json: "", name: "", family: null, isWanted: false };
 
 /** A processed photograph. */
 export type Shot = { name: string; json: string; corners: number; labelled: boolean };

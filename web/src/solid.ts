@@ -8,6 +8,9 @@ import type { Hinge } from "./worker";
 const HIGH = 0.8;
 const OF_WINDOW = 0.6;
 
+/** Duration of folding or unfolding, ms. */
+const PLAY_MS = 1800;
+
 /** Camera distance as a multiple of the diagonal of the bounding box. */
 const AWAY = 1.35;
 
@@ -18,6 +21,8 @@ let renderer: WebGLRenderer | null = null;
 export type Folding = {
   /** Unfolds by a fraction: 0 is the solid, 1 the net. */
   unfold(part: number): void;
+  /** Unfolds smoothly to a fraction and reports each step; at once for users who prefer reduced motion. */
+  play(to: number, step: (part: number) => void): void;
   /** Fits the view into the available space. */
   fit(): void;
   /** Frees its graphics memory. */
@@ -92,7 +97,29 @@ export async function showMesh(place: HTMLElement, glb: Uint8Array, hinges: Hing
     controls.update();
   }
 
+  let playing = 0;
+  let unfolded = 0;
   function unfold(part: number): void {
+    cancelAnimationFrame(playing);
+    move(part);
+  }
+
+  function play(to: number, step: (part: number) => void): void {
+    cancelAnimationFrame(playing);
+    const [from, begin] = [unfolded, performance.now()];
+    const ms = matchMedia("(prefers-reduced-motion: reduce)").matches ? 0 : PLAY_MS * Math.abs(to - from);
+    const frame = (now: number) => {
+      const time = ms === 0 ? 1 : Math.min(Math.max(now - begin, 0) / ms, 1);
+      const part = from + (to - from) * time * time * (3 - 2 * time);
+      move(part);
+      step(part);
+      if (time < 1) playing = requestAnimationFrame(frame);
+    };
+    playing = requestAnimationFrame(frame);
+  }
+
+  function move(part: number): void {
+    unfolded = part;
     towards = camera.position.clone().sub(controls.target).normalize();
     const moved = motions(hinges, part);
     const at = new Vector3();
@@ -117,8 +144,10 @@ export async function showMesh(place: HTMLElement, glb: Uint8Array, hinges: Hing
   fit();
   return {
     unfold,
+    play,
     fit,
     end() {
+      cancelAnimationFrame(playing);
       window.removeEventListener("resize", fit);
       controls.dispose();
       for (const mesh of meshes) {

@@ -9,7 +9,7 @@ import type * as See from "../pkg/see/deltille.js";
 import seeCode from "../pkg/see/deltille_bg.wasm?url";
 import type * as Solve from "../pkg/solve/deltille.js";
 import solveCode from "../pkg/solve/deltille_bg.wasm?url";
-import { familyFile, familyNames } from "./families-files";
+import { dictionaryTable, familyFile, familyNames } from "./families-files";
 
 type Module<T> = T & { default: (options: { module_or_path: URL }) => Promise<unknown> };
 
@@ -37,7 +37,9 @@ const solver = once<typeof Solve>(solveCode, () => import("../pkg/solve/deltille
 
 export type Reach = { corners: number; tags: number; ids_left: number; detail_mm: number; needed_px: number; size_mm: number };
 export type Hinge = { face: number; on: number | null; ends_mm: [number, number, number][]; angle_rad: number };
-export type Pages = { pages: string[]; json: string; reach: Reach; family: string | null };
+/** The paper of a target; without a name if it has another size. */
+export type Sheets = { paper: string | null; size_mm: [number, number]; pages: number; edge_mm: number | null };
+export type Pages = { pages: string[]; json: string; reach: Reach; sheets: Sheets | null; family: string | null };
 export type File = { name: string; bytes: Uint8Array };
 export type Solid = { glb: Uint8Array; hinges: Hinge[] };
 export type Proof = { passed: boolean; line: string; sentences: string[]; files: number };
@@ -83,8 +85,8 @@ export type Result = { figures: Figures; said: string[]; files: { name: string; 
 /** Ink spread of a print, estimated from several images: for the library, and in words. */
 export type Ink = { estimate: string; words: string };
 
-/** The target to find: the description of one, or an untagged board. */
-export type Sought = { target: string } | { grid: string };
+/** The target to find: the description of one, with its family file if that is not bundled, or an untagged board. */
+export type Sought = { target: string; family?: string | null } | { grid: string };
 
 /** An object in the memory of a module, to be freed after use. */
 type Held = { free(): void };
@@ -111,7 +113,7 @@ async function finderOf(sought: Sought, ink: Ink | null = null): Promise<See.Fin
   if ("grid" in sought) made = Finder.of_grid(sought.grid, 0, 0);
   else {
     const name = family_of(sought.target);
-    const file = name === undefined ? undefined : await familyFile(name);
+    const file = sought.family ?? (name === undefined ? undefined : await fileOf(name));
     if (name !== undefined && file === undefined) throw new Error(`the target uses tag family ${name}, which is not bundled with this page`);
     made = Finder.of_target(sought.target, file);
   }
@@ -125,7 +127,7 @@ async function finderOf(sought: Sought, ink: Ink | null = null): Promise<See.Fin
 function codesOf(name: string): Promise<Make.Codes> {
   const known = codes.get(name);
   if (known) return known;
-  const made = maker().then(async ({ Codes }) => new Codes((await familyFile(name)) ?? ""));
+  const made = maker().then(async ({ Codes }) => new Codes((await fileOf(name)) ?? ""));
   codes.set(name, made);
   made.catch(() => codes.delete(name));
   return made;
@@ -150,11 +152,26 @@ function detect(find: () => See.Found, also: (found: See.Found) => void = () => 
   }
 }
 
-async function madeOf(settings: string): Promise<{ made: Make.Made; family: string | undefined }> {
+/** The text of a family file; undefined if no family of that name is bundled. */
+async function fileOf(name: string): Promise<string | undefined> {
+  const table = await dictionaryTable(name);
+  return table === undefined ? familyFile(name) : (await maker()).dictionary_file(name, table);
+}
+
+/** A target, the name of its family unless the settings contain the file, and that file. */
+async function madeOf(settings: string): Promise<{ made: Make.Made; family: string | undefined; file: string | undefined }> {
   const { Made, family_of_settings } = await maker();
-  const name = family_of_settings(settings);
-  const family = name === undefined ? undefined : await familyFile(name);
-  return { made: new Made(settings, family), family: name };
+  const family = family_of_settings(settings);
+  const file = family === undefined ? ((JSON.parse(settings) as { family_file?: string | null }).family_file ?? undefined) : await fileOf(family);
+  return { made: new Made(settings, file), family, file };
+}
+
+/** Formats that the large module `prove` writes. */
+const LARGE = ["png", "gltf", "obj", "3mf", "stl", "skeleton"];
+
+/** The files of a target in a format. */
+async function filesOf(made: Make.Made, family: string | undefined, format: string): Promise<File[]> {
+  return inFiles(LARGE.includes(format) ? (await prover()).files(made.json(), family, format, 300) : made.files(format));
 }
 
 function inFiles(made: unknown[]): File[] {
@@ -170,13 +187,25 @@ const calls = {
   async families(): Promise<FamilyFacts[]> {
     return JSON.parse((await maker()).families()) as FamilyFacts[];
   },
+  async dictionaries(): Promise<string[]> {
+    return (await maker()).dictionaries();
+  },
+  /** The outline of a logo. */
+  async logo(svg: string): Promise<string> {
+    return (await prover()).logo_of_svg(svg);
+  },
   async draw(settings: string): Promise<Pages> {
     const { made, family } = await madeOf(settings);
     return using(made, (made) => {
       const text = new TextDecoder();
-      const pages = inFiles(made.files("svg", 300)).map(({ bytes }) => text.decode(bytes));
-      return { pages, json: made.json(), reach: JSON.parse(made.reach()) as Reach, family: family ?? null };
+      const pages = inFiles(made.files("svg")).map(({ bytes }) => text.decode(bytes));
+      const sheets = JSON.parse(made.sheets() ?? "null") as Sheets | null;
+      return { pages, json: made.json(), reach: JSON.parse(made.reach()) as Reach, sheets, family: family ?? null };
     });
+  },
+  /** The number of A4 pages on which the target fits; null if it does not. */
+  async pagesOnA4(settings: string): Promise<number | null> {
+    return using((await madeOf(settings)).made, (made) => made.pages_on_a4() ?? null);
   },
   async distances(settings: string, fieldOfView: number, width: number): Promise<[number, number] | null> {
     return using((await madeOf(settings)).made, (made) => {
@@ -185,20 +214,21 @@ const calls = {
     });
   },
   async files(settings: string, format: string): Promise<File[]> {
-    return using((await madeOf(settings)).made, (made) => inFiles(made.files(format, 300)));
+    const { made, file } = await madeOf(settings);
+    return using(made, (made) => filesOf(made, file, format));
   },
   async solid(settings: string): Promise<Solid> {
-    return using((await madeOf(settings)).made, (made) => ({
-      glb: inFiles(made.files("gltf", 300))[0]?.bytes ?? new Uint8Array(),
+    const { made, file } = await madeOf(settings);
+    return using(made, async (made) => ({
+      glb: (await filesOf(made, file, "gltf"))[0]?.bytes ?? new Uint8Array(),
       hinges: JSON.parse(made.hinges()) as Hinge[],
     }));
   },
   async prove(settings: string, format: string): Promise<Proof> {
-    const { made, family } = await madeOf(settings);
+    const { made, file } = await madeOf(settings);
     const { prove } = await prover();
     return using(made, async (made) => {
-      const files = inFiles(made.files(format, 300));
-      const file = family === undefined ? undefined : await familyFile(family);
+      const files = await filesOf(made, file, format);
       const proof = JSON.parse(prove(made.json(), file, files.map(({ name }) => name), files.map(({ bytes }) => bytes))) as Omit<Proof, "files">;
       return { ...proof, files: files.length };
     });
@@ -284,9 +314,9 @@ const calls = {
     const found = survey(target, detections, names, model);
     return found === undefined ? null : (JSON.parse(found) as Survey);
   },
-  async calibrate(target: string, detections: string[], names: string[], model: string): Promise<Result> {
+  async calibrate(target: string, detections: string[], names: string[], model: string, printScale: [number, number] | null): Promise<Result> {
     const { Solved } = await solver();
-    return using(new Solved(target, detections, names, model), (solved) => {
+    return using(new Solved(target, detections, names, model, printScale && Float64Array.from(printScale)), (solved) => {
       const files = [
         { name: "camera.json", text: solved.json() },
         { name: "camera.yaml", text: solved.yaml() },

@@ -34,7 +34,7 @@ test("calibrate", async ({ page }) => {
   await page.goto("/#see");
   await show(page, Array.from({ length: 10 }, (_, i) => join(folder, `${i}.png`)));
   await page.getByRole("button", { name: /9\.png 72 corners/ }).waitFor();
-  await page.getByRole("link", { name: "Calibrate" }).click();
+  await page.getByRole("link", { name: "Calibrate", exact: true }).click();
   await page.getByRole("button", { name: "Calibrate", exact: true }).click();
   await page.getByText("Reprojection error").waitFor();
   await picture(page, "calibrate");

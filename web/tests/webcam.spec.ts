@@ -12,7 +12,7 @@ test("webcam images are captured automatically, and memory stays constant", asyn
   await page.goto("/#see");
   await chooseFiles(page, [join(folder, "board.json"), join(folder, "0.png")]);
   await expect(page.getByRole("button", { name: /0\.png 72 corners/ })).toBeVisible({ timeout: 30_000 });
-  await page.getByRole("link", { name: "Calibrate" }).click();
+  await page.getByRole("link", { name: "Calibrate", exact: true }).click();
   await page.getByLabel("Capture images").selectOption("free");
   await page.getByRole("button", { name: "Use a webcam" }).click();
   await expect(page.getByText(/[3-9] images captured/)).toBeVisible({ timeout: 60_000 });

@@ -123,7 +123,7 @@ fn lists_are_those_of_the_library() {
     compare("docs/printing.md", "papers", &PaperSize::choice().replace("297x420mm", "`297x420mm`"));
     let papers = PaperSize::all().map(|size| format!("{:?}", size.name())).collect::<Vec<_>>();
     let papers = format!("\nconst papers = [{}];\n", papers.join(", "));
-    compare("web/src/make.ts", "papers", &papers);
+    compare("web/src/target-form.ts", "papers", &papers);
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! Tag codes: figures of families, decoding and error rates.
 
 use deltille_core::family::{
-    ACCEPTED_FALSE_POSITIVES, Decoder, Family, corrected_within, shipped_families,
+    ACCEPTED_FALSE_POSITIVES, Decoder, Family, corrected_within, dictionary_family,
+    dictionary_names, shipped_families,
 };
 use wasm_bindgen::prelude::*;
 
@@ -17,6 +18,23 @@ pub fn families() -> String {
         })
     });
     serde_json::Value::from_iter(known).to_string()
+}
+
+/// Returns the names of OpenCV's dictionaries.
+#[wasm_bindgen]
+pub fn dictionaries() -> Vec<String> {
+    dictionary_names().map(str::to_owned).collect()
+}
+
+/// Returns the family file of a dictionary from its table, or from the family file of its AprilTags.
+///
+/// # Errors
+/// Throws if there is no dictionary of that name, or if the table is not valid.
+#[wasm_bindgen]
+pub fn dictionary_file(name: &str, table: &str) -> Result<String, JsError> {
+    let family = dictionary_family(name, table)
+        .ok_or_else(|| JsError::new(&format!("unknown dictionary {name}")))?;
+    Ok(family.raise()?.to_json())
 }
 
 /// A family with its decoder.

@@ -2,13 +2,14 @@
 //!
 //! | module | purpose |
 //! |---|---|
-//! | `make` | makes targets and their files from settings |
-//! | `prove` | reads files back and compares them with their target |
+//! | `make` | makes targets and their files from settings, except for PNG pages and meshes |
+//! | `prove` | makes PNG pages and meshes, reads files back and compares them with their target, reads logos |
 //! | `photo` | decodes photographs and draws detections over them |
 //! | `see` | detects corners in grey values and webcam frames |
 //! | `solve` | calibrates a camera from corners and writes its report |
 //! | `codes` | figures of tag families, decoding and error rates |
 //! | `family` | sets the family of a target from its file |
+//! | `files` | converts files to JavaScript values |
 //! | `errors` | converts errors of the library to JavaScript exceptions |
 //!
 //! The crate is built once for each of the first five, as modules that a page loads on demand; `codes` is part of `make`.
@@ -22,6 +23,8 @@ pub mod codes;
 mod errors;
 #[cfg(any(feature = "prove", feature = "see"))]
 mod family;
+#[cfg(any(feature = "make", feature = "prove"))]
+mod files;
 #[cfg(feature = "make")]
 pub mod make;
 #[cfg(feature = "photo")]

@@ -6,10 +6,13 @@ use deltille_calibrate::{
 };
 use deltille_core::camera::{CameraFile, Pose};
 use deltille_core::detection::{Detection, InkEstimate};
+use deltille_core::quantity::print_scale;
 use deltille_core::targets::Target;
 use deltille_files::export::calibration::{Print, Residuals};
+use deltille_files::export::sheet::Sheet;
 use deltille_files::export::{calibration, camera, detection, next_view, saved};
 use deltille_files::report::{Report, Survey};
+use deltille_layout::Printing;
 use wasm_bindgen::prelude::*;
 
 use crate::errors::{Raise, one_line};
@@ -28,25 +31,31 @@ pub struct Solved {
 
 #[wasm_bindgen]
 impl Solved {
-    /// Calibrates a camera from detections of a target, one JSON text per image.
+    /// Calibrates a camera from detections of a target, one JSON text per image. `print_scale` contains the ratios of the
+    /// measured to the stated length of the check bars, across and up the sheet, if they were measured.
     ///
     /// # Errors
-    /// Throws if there are too few views, if they are too similar, or if they do not belong together.
+    /// Throws if there are too few views, if they are too similar, if they do not belong together, or if the print scale is not
+    /// valid or does not apply to the target.
     #[wasm_bindgen(constructor)]
     pub fn new(
         target: &str,
         detections: Vec<String>,
         names: Vec<String>,
         model: &str,
+        print_scale: Option<Vec<f64>>,
     ) -> Result<Self, JsError> {
-        let target = Target::from_json(target).raise()?;
+        let Printing { target, sheets, .. } = Printing::from_json(target).raise()?;
+        let sheet = Sheet { print_scale: checked(print_scale)?, shape: None, sheets };
         let reference = Reference::Target(&target);
         let model: Model = model.parse().raise()?;
         let read = read(names, &detections)?;
         let found: Vec<_> = read.iter().filter_map(|(_, found)| found.ink).collect();
-        let print = Print { scale: None, ink: InkEstimate::of_all(&found) };
-        let shown = views(&read, &reference).raise()?;
-        let calibration = Calibration::of(&reference, reference.panels()).camera(
+        let print = Print { scale: sheet.print_scale, ink: InkEstimate::of_all(&found) };
+        let mut shown = views(&read, &reference).raise()?;
+        sheet.put_on(Some(&target), &mut shown.views).raise()?;
+        let panels = sheet.panels(&reference).raise()?;
+        let calibration = Calibration::of(&reference, panels).camera(
             "camera",
             shown.views,
             Intrinsics::Unknown(model),
@@ -56,7 +65,7 @@ impl Solved {
         estimate.excluded.splice(0..0, shown.excluded.into_iter().map(|(_, out)| out));
         let found =
             estimate.cameras.first().ok_or_else(|| JsError::new("no camera was calibrated"))?;
-        let words = Messages::new(&estimate, None);
+        let words = Messages::new(&estimate, print.scale);
         let said = diagnoses.iter().map(|diagnosis| one_line(&words.sentence(diagnosis))).collect();
         let poses = estimate.pose_uncertainties(std::slice::from_ref(&target));
         let mut page = Report::new("camera", &estimate);
@@ -161,6 +170,17 @@ pub fn survey(
         "tilts": tilts.collect::<Vec<_>>(),
     });
     Ok(Some(json.to_string()))
+}
+
+/// Checks that a print scale, if given, consists of two ratios in the range of the programs.
+fn checked(print_scale: Option<Vec<f64>>) -> Result<Option<[f64; 2]>, JsError> {
+    let Some(given) = print_scale else { return Ok(None) };
+    let range = print_scale::RANGE;
+    let is_ratio = |ratio: f64| (range.least..=range.most).contains(&ratio);
+    match given[..] {
+        [across, up] if is_ratio(across) && is_ratio(up) => Ok(Some([across, up])),
+        _ => Err(JsError::new("not a valid ratio of measured to stated length (near 1)")),
+    }
 }
 
 /// Reads detections and pairs them with their names.

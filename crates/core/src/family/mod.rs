@@ -73,7 +73,7 @@ pub use tables::{
 };
 use tables::{aruco, file, shipped};
 #[doc(hidden)]
-pub use {hex::parse_word, kernels::nearer};
+pub use {hex::parse_word, kernels::nearer, tables::dictionary_family};
 
 use crate::lattice::{Dimension, GridKind, TagCells};
 
@@ -175,18 +175,24 @@ impl Family {
         if self.kind == kind { Some(self) } else { self.squares.as_deref() }
     }
 
-    /// Returns a shipped family by name: one of [`shipped_families`], or a dictionary of [`dictionary_names`].
+    /// Returns a shipped family by name: one of [`shipped_families`], or a dictionary of [`dictionary_names`]. In a browser,
+    /// only the position codes are shipped: a page fetches the files of the families that it needs.
     ///
     /// # Errors
     /// Returns an error if no family of that name is shipped; the message lists those that are.
     pub fn shipped(name: &str) -> Result<Self, FamilyError> {
-        match shipped::json(name) {
-            Some(json) => Self::from_json(json),
-            None => aruco::family(name).unwrap_or_else(|| {
-                let shipped = [shipped_names(), square_names(), vec![positions::NAME]].concat();
-                Err(FamilyError::Unknown { name: name.to_owned(), shipped })
-            }),
-        }
+        let found = if name == positions::NAME {
+            Some(Ok(Self::places()))
+        } else if cfg!(target_family = "wasm") {
+            None
+        } else {
+            let file = shipped::json(name).map(Self::from_json);
+            file.or_else(|| aruco::family(name, shipped::json))
+        };
+        found.unwrap_or_else(|| {
+            let shipped = [shipped_names(), square_names(), vec![positions::NAME]].concat();
+            Err(FamilyError::Unknown { name: name.to_owned(), shipped })
+        })
     }
 
     /// Creates the family of position codes, see [`positions`].

@@ -201,6 +201,8 @@ pub type Files = Vec<(String, Vec<u8>)>;
 ///
 /// # Errors
 /// Returns an error if the target has no files of this kind, or if the family of its tags is unknown.
+// Inlined, so that a program that makes only some kinds does not contain the writers of the others.
+#[inline(always)]
 pub fn make(printing: &Printing, what: What, making: Making) -> Result<Files, MakeError> {
     let target = &printing.target;
     let name = &target.name;
@@ -289,6 +291,7 @@ fn skeleton(target: &Target) -> Result<Skeleton, MakeError> {
 }
 
 /// The pages of a target.
+#[inline(always)]
 fn drawn(printing: &Printing, what: What, making: Making) -> Result<Files, MakeError> {
     if printing.sheets.is_empty() {
         return Err(MakeError::NoSheets(printing.target.name.to_string()));

@@ -68,33 +68,58 @@ fn find(name: &str) -> Option<&'static Dictionary> {
     DICTIONARIES.iter().find(|dictionary| short(dictionary.name) == short(name))
 }
 
-/// Returns the family of a dictionary by name; `None` if there is none of that name.
-pub(in crate::family) fn family(name: &str) -> Option<Result<Family, FamilyError>> {
-    let Dictionary { name, side, len, distance } = find(name)?;
-    Some(codes(name, *side, *len).and_then(|codes| {
+/// Returns the family of a dictionary by name; `None` if there is none of that name. `shipped` returns the file of a
+/// shipped family.
+pub(in crate::family) fn family(
+    name: &str,
+    shipped: impl FnOnce(&str) -> Option<&'static str>,
+) -> Option<Result<Family, FamilyError>> {
+    let dictionary = find(name)?;
+    let table = match (dictionary.april_tag(), dictionary.side) {
+        (Some(family), _) => shipped(&family)?,
+        (None, 4) => include_str!("../../../families/aruco/4x4.txt"),
+        (None, 5) => include_str!("../../../families/aruco/5x5.txt"),
+        (None, 6) => include_str!("../../../families/aruco/6x6.txt"),
+        (None, _) => include_str!("../../../families/aruco/7x7.txt"),
+    };
+    Some(dictionary.family(table))
+}
+
+/// Returns the family of a dictionary from a table in `families/aruco` or, for AprilTags, from the file of their family. A
+/// program in a browser fetches these only when it needs them. `None` if there is no dictionary of that name.
+#[doc(hidden)]
+pub fn dictionary_family(name: &str, table: &str) -> Option<Result<Family, FamilyError>> {
+    Some(find(name)?.family(table))
+}
+
+impl Dictionary {
+    /// Returns the name of the family of AprilTag with these codes, if there is one.
+    fn april_tag(&self) -> Option<String> {
+        self.name.strip_prefix("DICT_APRILTAG_").map(|bits| format!("aprilTag{bits}"))
+    }
+
+    /// Returns the family of the first codes of a table.
+    fn family(&self, table: &str) -> Result<Family, FamilyError> {
+        let Self { name, side, len, distance } = self;
         let dimension = Dimension::from_bits(side * side)
             .map_err(|error| FamilyError::field("bits", error.to_string()))?;
+        let codes = match self.april_tag() {
+            Some(_) => {
+                let family = Family::from_json(table)?;
+                let words = TagWords::of(family.kind(), family.dimension());
+                family.codes().iter().map(|&code| words.rotate(words.rotate(code))).collect()
+            }
+            None => {
+                let codes = table.lines().take(*len).map(|code| u64::from_str_radix(code, 16));
+                codes
+                    .collect::<Result<_, _>>()
+                    .map_err(|error| FamilyError::field("codes", error.to_string()))?
+            }
+        };
         let source = format!("OpenCV, {name}, bits in rows; families/LICENSE-OpenCV.md");
         let construction = Construction::Imported { source };
         Family::of(name, GridKind::Checker, dimension, *distance, codes, Rules::NONE, construction)
-    }))
-}
-
-/// Returns the codes of a dictionary.
-fn codes(name: &str, side: u32, len: usize) -> Result<Vec<u64>, FamilyError> {
-    if let Some(bits) = name.strip_prefix("DICT_APRILTAG_") {
-        let family = Family::shipped(&format!("aprilTag{bits}"))?;
-        let words = TagWords::of(family.kind(), family.dimension());
-        return Ok(family.codes().iter().map(|&code| words.rotate(words.rotate(code))).collect());
     }
-    let table = match side {
-        4 => include_str!("../../../families/aruco/4x4.txt"),
-        5 => include_str!("../../../families/aruco/5x5.txt"),
-        6 => include_str!("../../../families/aruco/6x6.txt"),
-        _ => include_str!("../../../families/aruco/7x7.txt"),
-    };
-    let codes = table.lines().take(len).map(|code| u64::from_str_radix(code, 16));
-    codes.collect::<Result<_, _>>().map_err(|error| FamilyError::field("codes", error.to_string()))
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ pub(in crate::family) mod import;
 pub(in crate::family) mod published_bounds;
 pub(super) mod shipped;
 
-pub use aruco::{dictionary, dictionary_names};
+pub use aruco::{dictionary, dictionary_family, dictionary_names};
 pub use export::{ExportFormat, export};
 pub use file::{Construction, check_name};
 pub use growth::Beginning;

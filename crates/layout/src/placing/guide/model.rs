@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
+use deltille_core::angles::direction;
 use deltille_core::lattice::{GridKind, Tile};
 use deltille_core::polygon::rectangle;
 use deltille_core::targets::{Corner, Panel, Polyhedron, Target, TargetSpec};
@@ -159,7 +160,7 @@ fn tile_lines(panel: &Panel) -> Vec<[DVec2; 2]> {
     if let Some(diameter) = panel.discs_mm {
         let rim = |corner: &Corner, n: usize| {
             let angle = TAU * n as f64 / DISC_SIDES as f64;
-            corner.panel_mm + diameter / 2.0 * DVec2::from_angle(angle)
+            corner.panel_mm + diameter / 2.0 * direction(angle)
         };
         let of_disc = |corner| (0..DISC_SIDES).map(move |n| [rim(corner, n), rim(corner, n + 1)]);
         return panel.corners.iter().flat_map(of_disc).collect();
