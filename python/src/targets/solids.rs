@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use deltille::export::solid_mesh;
 use deltille::family::Family;
-use deltille::layout::{Finish, PaperSpec, SolidSheets};
+use deltille::layout::{Finish, PaperSpec, SolidSheets, usual_solid_edge_mm};
 use deltille::limits::Limits;
 use deltille::targets::{
     ClosedMesh, NEAR_EQUILATERAL, Name, SkeletonSpec, SolidShape, SolidSpec, TagSpec, TagsIn,
@@ -90,7 +90,6 @@ impl Solids {
         };
         let tiles = self.tiles.map(|tiles| whole("tiles", tiles, errors::target)).transpose()?;
         let mut spec = SolidSpec {
-            edge_mm: self.edge_mm.unwrap_or(usual.edge_mm),
             tiles: tiles.unwrap_or(usual.tiles),
             board_id: whole("board_id", self.board_id, errors::target)?,
             tags,
@@ -99,6 +98,7 @@ impl Solids {
             skeleton: self.skeleton,
             ..usual
         };
+        spec.edge_mm = self.edge_mm.unwrap_or_else(|| usual_solid_edge_mm(&spec, paper));
         spec.margin_mm = match self.face_margin_mm {
             Some(given) => given,
             None => spec.comfortable_margin_mm().raise(errors::target)?,
@@ -119,8 +119,8 @@ macro_rules! solid {
     ) => {
         $(#[$doc])*
         /// edge_mm : float, optional
-        ///     Edge of the solid, mm; defaults to 150. A cuboid or mesh is scaled so that its mean edge has this length; by
-        ///     default it is not scaled.
+        ///     Edge of the solid, mm; defaults to 150 or, with ``paper``, to the largest whole number with which its net fits on
+        ///     ``pages``. A cuboid or mesh is scaled so that its mean edge has this length; by default it is not scaled.
         /// tiles : int, optional
         ///     Black tiles along each side of a face; defaults to 10, or to 8 for squares.
         /// face_margin_mm : float, optional
@@ -140,6 +140,9 @@ macro_rules! solid {
         /// allow_seams : bool, optional
         ///     Split a net larger than the paper across pages that are joined along seams through its tiles, instead of into
         ///     pieces of whole faces.
+        /// pages : int, optional
+        ///     Largest number of pages for the net. Without ``paper``, the smallest paper is selected for it; defaults to 1 if
+        ///     that fits A0.
         /// tag_ids, guide_page, paper, orientation, margin_mm, note, logo, logo_height_mm, name
         ///     See :class:`Board`.
         ///
@@ -156,7 +159,7 @@ macro_rules! solid {
             #[pyo3(signature = ($($given,)* *, $($keyword = $default,)* edge_mm = None, tiles = None,
                 face_margin_mm = None, family = None, tags = true, tag_spacing = None, tag_border = None, hole_mm = None, first_id = 0,
                 board_id = 0, inverted = false, skeleton = false, panel_thickness_mm = None, wall_mm = None, rib_mm = None, per_face = false,
-                allow_seams = false, tag_ids = false, guide_page = false, paper = None, orientation = "auto",
+                allow_seams = false, tag_ids = false, guide_page = false, paper = None, pages = None, orientation = "auto",
                 margin_mm = None, note = None, logo = None, logo_height_mm = None, name = None))]
             #[expect(clippy::too_many_arguments, reason = "keywords")]
             fn new(
@@ -182,6 +185,7 @@ macro_rules! solid {
                 tag_ids: bool,
                 guide_page: bool,
                 paper: Option<&str>,
+                pages: Option<i64>,
                 orientation: &str,
                 margin_mm: Option<f64>,
                 note: Option<String>,
@@ -209,7 +213,8 @@ macro_rules! solid {
                 };
                 let of_all =
                     paper_of(paper, orientation, margin_mm, sheets(per_face, allow_seams)?)?;
-                let paper = PaperSpec { note, tag_ids, guide_page, ..of_all };
+                let pages = pages.map(|pages| whole("pages", pages, errors::target)).transpose()?;
+                let paper = PaperSpec { pages, note, tag_ids, guide_page, ..of_all };
                 let paper = with_logo(paper, logo, logo_height_mm)?;
                 Ok(PyClassInitializer::from(solids.make(name, &paper)?).add_subclass(Self))
             }
