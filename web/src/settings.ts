@@ -31,6 +31,7 @@ export type Settings = {
   poster: boolean;
   packed: boolean;
   paper: string | null;
+  pages: number | null;
   orientation: string;
   margin_mm: number | null;
   guide_page: boolean;
@@ -76,6 +77,7 @@ export const usual: Settings = {
   poster: false,
   packed: false,
   paper: null,
+  pages: null,
   orientation: "auto",
   margin_mm: null,
   guide_page: false,
@@ -125,6 +127,7 @@ const APPLIES: Partial<Record<keyof Settings, string[]>> = {
   skeleton: SOLIDS,
   per_face: SOLIDS,
   allow_seams: SOLIDS,
+  pages: SOLIDS,
   poster: BOARDS,
   packed: BOARDS,
   mirrored: FLAT,
@@ -139,7 +142,7 @@ const CHOICES: Record<string, string[]> = {
   tags_in: ["black", "white"],
   orientation: ["auto", "portrait", "landscape"],
 };
-const NUMBERS = ["rows", "cols", "edge_mm", "marker_mm", "gap", "diameter_mm", "tag_spacing", "tag_border", "hole_mm", "first_id", "board_id", "boards", "two_sided_mm", "tiles", "face_margin_mm", "margin_mm", "logo_height_mm", "kerf_mm"];
+const NUMBERS = ["rows", "cols", "edge_mm", "marker_mm", "gap", "diameter_mm", "tag_spacing", "tag_border", "hole_mm", "first_id", "board_id", "boards", "two_sided_mm", "tiles", "face_margin_mm", "pages", "margin_mm", "logo_height_mm", "kerf_mm"];
 
 /** The default tag family, and those of other kinds. */
 export const DEFAULT_FAMILY = "delTag25h7";
@@ -230,6 +233,7 @@ const KEYS: [string, keyof Settings][] = [
   ["poster", "poster"],
   ["pack", "packed"],
   ["paper", "paper"],
+  ["pages", "pages"],
   ["orientation", "orientation"],
   ["margin", "margin_mm"],
   ["guide-page", "guide_page"],

@@ -114,7 +114,8 @@ export function targetForm({ changed: report, chooseMesh, chooseLogo }: Given): 
     const options: [string, string][] = [["", text.smallest], ...papers.map((paper): [string, string] => [paper, paper]), [other, other]];
     const choice = select(options, paper ?? "", (paper) => changed({ paper: paper === text.otherPaper ? "400x300mm" : paper || null }, true));
     const [, width, height] = /^([\d.]+) ?[x×] ?([\d.]+) ?mm$/.exec(paper ?? "") ?? [];
-    if (!isOther || width === undefined) return [field(text.paper, choice)];
+    const pages = isSolid(settings) && !settings.per_face ? [number(text.pages, "pages", 1, 500, text.usual)] : [];
+    if (!isOther || width === undefined) return [field(text.paper, choice), ...pages];
     const side = (label: string, value: string | undefined) => {
       const control = el("input", { type: "number", min: 50, max: 5080, step: "any", required: true, value: value ?? "", input: resized });
       return { control, field: field(label, control) };
@@ -126,7 +127,7 @@ export function targetForm({ changed: report, chooseMesh, chooseLogo }: Given): 
       if (option) option.value = option.text = paper;
       changed({ paper });
     }
-    return [field(text.paper, choice), ...sides.map(({ field }) => field)];
+    return [field(text.paper, choice), ...sides.map(({ field }) => field), ...pages];
   }
 
   function tags(): HTMLElement[] {

@@ -61,6 +61,7 @@ export const words = {
     tagsInColours: { black: "black", white: "white" } as Record<string, string>,
     spacing: "Tag every n-th row and column",
     border: "Tag border, in cells",
+    pages: "Largest number of pages",
     paper: "Paper",
     smallest: "smallest that fits",
     otherPaper: "other size…",

@@ -81,6 +81,7 @@ struct Wanted {
     /// The text of an OBJ file.
     mesh: Option<String>,
     paper: Option<String>,
+    pages: Option<u32>,
     orientation: String,
     margin_mm: Option<f64>,
     guide_page: bool,
@@ -129,6 +130,7 @@ impl Default for Wanted {
             packed: false,
             mesh: None,
             paper: None,
+            pages: None,
             orientation: "auto".to_owned(),
             margin_mm: None,
             guide_page: false,
@@ -165,6 +167,7 @@ impl Wanted {
                 (false, true) => SolidSheets::SeamedNet,
                 (false, false) => SolidSheets::Net,
             },
+            pages: self.pages.filter(|_| !self.per_face),
             poster: self.poster,
             packed: self.packed,
             note: self.note.clone().filter(|note| !note.is_empty()),
