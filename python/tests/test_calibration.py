@@ -348,3 +348,8 @@ def test_a_board_of_another_size_is_rejected(tmp_path, board, camera, detections
     with pytest.raises(deltille.CalibrationError, match=sizes + ".*assume_target=True"):
         deltille.compare(calibration, wrong)
     assert deltille.compare(calibration, wrong, assume_target=True).rms_px < 1e-3
+
+
+def test_models_have_their_names_in_other_programs(detections, board):
+    fisheye = deltille.calibrate(detections, board, model="fisheye")
+    assert fisheye.model == "kannala-brandt" and fisheye == deltille.calibrate(detections, board, model="kannala-brandt")

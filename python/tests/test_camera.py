@@ -82,3 +82,17 @@ def test_a_synthetic_image_has_its_truth(board, camera):
     for wrong in [{"noise": -1}, {"dtype": "int8"}, {"gradient": (9, 0)}, {}]:
         with pytest.raises(deltille.TargetError):
             deltille.render(board, camera, **({"eye": (60, -50, 400)} if wrong else {}), **wrong)
+
+
+def test_rendering_from_behind_warns(board, camera):
+    for target, side, sign in [(board, "z > 0", 1), (deltille.Charuco((5, 7)), "z < 0", -1)]:
+        middle = target.corners.mean(axis=0)
+        with pytest.warns(UserWarning, match=side):
+            assert not deltille.render(target, camera, eye=middle - [0, 0, sign * 400])[1]
+        assert deltille.render(target, camera, eye=middle + [0, 0, sign * 400])[1]
+
+
+def test_an_unnamed_image_is_named_in_the_reason_without_a_pose(board, camera):
+    found = deltille.Detector(board).detect(numpy.zeros((960, 1280), numpy.uint8))
+    why = deltille.pose(found, camera).why
+    assert why and why[0].isalpha(), why
