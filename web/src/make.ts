@@ -42,6 +42,7 @@ export function make(): HTMLElement {
   let addressed = location.hash;
   let pages: Pages | null = null;
   let at = 0;
+  let isFirstDrawing = true;
   let isTurning = false;
   let folded: Folding | null = null;
   /** The settings of the solid shown. */
@@ -192,7 +193,8 @@ export function make(): HTMLElement {
     made.name = settings.name;
     made.family = applies("family_file", settings) ? settings.family_file : null;
     problem.hidden = true;
-    turnTo(Math.min(at, drawn.pages.length - 1));
+    turnTo(Math.min(at, drawn.pages.length - 1), isFirstDrawing && query(settings) === "");
+    isFirstDrawing = false;
     showFacts(drawn);
     // Do not rebuild the form: the user may be typing in it.
     if (settings.family === null && drawn.family) showFamily(drawn.family);
@@ -207,11 +209,13 @@ export function make(): HTMLElement {
   }, 250);
 
   /** Shows another page of the sheets. */
-  function turnTo(page: number): void {
+  function turnTo(page: number, isFirst = false): void {
     if (!pages) return;
     at = page;
     const count = pages.pages.length;
     const before = picture.src;
+    // The board drawn by the build is the same.
+    if (isFirst && before && at === 0) return;
     picture.src = URL.createObjectURL(new Blob([pages.pages[at] ?? ""], { type: "image/svg+xml" }));
     if (before) URL.revokeObjectURL(before);
     const step = (by: number) => () => turnTo((at + by + count) % count);

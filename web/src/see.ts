@@ -397,6 +397,7 @@ export function see(): HTMLElement {
     downloads.replaceChildren();
     lens.hidden = true;
     if (!photo) return;
+    status.className = `facts${photo.error ? " bad" : ""}`;
     const sample = samples.find(({ address }) => address === photo.key);
     credit.textContent = sample?.credit ?? "";
     credit.hidden = !sample?.credit;
