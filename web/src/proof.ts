@@ -1,4 +1,4 @@
-// Verification: begins by itself some time after a change, and ends with the next change.
+// Verification: begins some time after a change, and ends with the next change.
 import { el, settled } from "./dom";
 import { LibraryError, proving } from "./library";
 import { words } from "./words";

@@ -157,7 +157,7 @@ export const hasSquareTags = ({ kind }: Settings): boolean => ["checker", "april
 export const applies = (key: keyof Settings, { kind }: Settings): boolean => APPLIES[key]?.includes(kind) ?? true;
 export const usualFamily = (kind: string): string => DEFAULT_FAMILIES[kind] ?? DEFAULT_FAMILY;
 
-/** Whether settings contain files, so that neither an address nor a template contains all of them. */
+/** Whether settings contain files, which an address or a template cannot contain. */
 export const hasFiles = (settings: Settings): boolean => LONG.some((key) => settings[key] !== null && applies(key, settings));
 
 /** The default name of a kind of target. */

@@ -70,7 +70,7 @@ test.describe("make", () => {
     const made = scratch();
     drawn("board", "--rows", "8", "--cols", "9", "--pdf", "--svg", "--png", "--dsc", "-o", made);
     expect((await press(page, "Download PDF")).equals(readFileSync(join(made, "board.pdf")))).toBe(true);
-    // Verification begins by itself: of the PDF, and of the others once they are shown.
+    // Verification begins automatically: of the PDF, and of the others once they are shown.
     await expect(page.getByText("Verified: the PDF shows exactly this target.")).toBeVisible({ timeout: 60_000 });
     await screen(page, "make");
     await open(page, "More formats");

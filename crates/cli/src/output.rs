@@ -90,8 +90,10 @@ fn any_of(words: &[String]) -> String {
 /// Returns the file that `-o` means, see [`place`]: in a folder, `<stem>.<extension>`.
 pub fn file(output: &Path, stem: &str, extension: &str) -> anyhow::Result<PathBuf> {
     let Place { folder, file } = place(output, &[extension])?;
-    let stem = file.map_or(stem.to_owned(), |file| file.stem);
-    Ok(folder.join(format!("{stem}.{extension}")))
+    Ok(match file {
+        Some(_) => output.with_extension(extension),
+        None => folder.join(format!("{stem}.{extension}")),
+    })
 }
 
 /// Returns the path of the page of `--report`: a file that ends in .html, or a folder. Rejects unusable paths before the work

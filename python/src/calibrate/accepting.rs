@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use super::checking::{OfBoard, new_views};
 use crate::boundary::arrays::column;
 use crate::boundary::errors::{raised, unlocked};
-use crate::see::arguments::Targets;
+use crate::targets::target::Targets;
 
 /// The errors of measured lengths, with their uncertainties.
 #[pyclass(frozen, module = "deltille", eq)]

@@ -22,9 +22,8 @@ use super::views::{Diagnosis, Excluded};
 use crate::boundary::arrays::{self, record};
 use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
 use crate::boundary::text_file::save_text;
-use crate::see::arguments::Targets;
 use crate::see::pose::Pose;
-use crate::targets::target::Target;
+use crate::targets::target::{Target, Targets};
 
 /// Standard deviations of a rotation (rad), and of a position across and along the line of sight (mm).
 type PoseSd = (f64, f64, f64);

@@ -14,8 +14,9 @@ use super::keywords::of_detections;
 use super::solving::{How, Named, Seen, Solved, assume, named};
 use crate::boundary::errors;
 use crate::boundary::errors::{Raise, raised, unlocked};
-use crate::see::arguments::{Results, Targets};
+use crate::see::arguments::Results;
 use crate::see::detector::sides;
+use crate::targets::target::Targets;
 
 /// A quantity that may have changed, of a camera if there are several.
 #[pyclass(frozen, eq, hash, module = "deltille")]

@@ -18,11 +18,10 @@ use super::calibration::Rig;
 use super::solving::{Solved, print_scale_of};
 use crate::boundary::arrays::{self, distance};
 use crate::boundary::errors::{self, Raise, raised, unlocked};
-use crate::see::arguments::Targets;
 use crate::see::camera::Camera;
 use crate::see::detection::Detection;
 use crate::see::pose::Pose;
-use crate::targets::target::Target;
+use crate::targets::target::{Target, Targets};
 
 /// A calibrated or given camera.
 pub struct Compared(Estimate);

@@ -13,10 +13,11 @@ use pyo3::types::PyMapping;
 use super::calibration::{Calibration, Rig, calibration};
 use super::solving::{How, ModelChoice, OneCamera, Seen, Texts, constraints, named, solve};
 use crate::boundary::errors::{self, RaiseFile, raised};
-use crate::see::arguments::{Results, Targets};
+use crate::see::arguments::Results;
 use crate::see::camera::Camera;
 use crate::see::detection::Detection;
 use crate::see::detector::sides;
+use crate::targets::target::Targets;
 
 /// Calibrates a camera from detections.
 ///

@@ -10,9 +10,10 @@ use super::keywords::of_detections;
 use super::solving::{ModelChoice, Seen, assume, named};
 use crate::boundary::arrays::{self, number, whole};
 use crate::boundary::errors::{self, Raise, raised, unlocked};
-use crate::see::arguments::{Results, Targets};
+use crate::see::arguments::Results;
 use crate::see::camera::Camera;
 use crate::see::pose::Pose;
+use crate::targets::target::Targets;
 
 /// A proposed view: the pose of the board that improves the calibration most.
 #[pyclass(frozen, module = "deltille", eq)]

@@ -18,9 +18,10 @@ use super::keywords::of_detections;
 use super::solving::{How, Named, Seen, assume, named};
 use crate::boundary::arrays;
 use crate::boundary::errors::{self, Raise, raised, unlocked};
-use crate::see::arguments::{Results, Targets};
+use crate::see::arguments::Results;
 use crate::see::camera::Camera;
 use crate::see::pose::Pose;
+use crate::targets::target::Targets;
 
 /// Where a camera and a board are mounted on a robot.
 #[pyclass(frozen, module = "deltille", eq)]

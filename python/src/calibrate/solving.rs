@@ -21,9 +21,9 @@ use serde_json::Value;
 use crate::boundary::arrays::{number, vector, whole};
 use crate::boundary::errors::{self, Raise, raised, warn};
 use crate::boundary::interrupt::interruptible;
-use crate::see::arguments::Targets;
 use crate::see::detection::Detection;
 use crate::see::detector::{size, tiling};
+use crate::targets::target::Targets;
 
 /// The photographed target.
 pub enum Seen {

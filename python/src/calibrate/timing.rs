@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use super::checking::{before, check_target, given};
 use super::solving::{Seen, assume};
 use crate::boundary::errors::{self, Raise, raised, unlocked, warn};
-use crate::see::arguments::Targets;
+use crate::targets::target::Targets;
 
 /// When the rows of each camera are exposed.
 #[pyclass(frozen, module = "deltille", eq)]

@@ -1,25 +1,9 @@
-//! Targets and detections as arguments.
+//! Results of `detect_many` as arguments.
 
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use super::detection::Detection;
-use crate::targets::target::Target;
-
-/// A target, or several.
-pub struct Targets(pub Vec<Target>);
-
-impl<'a, 'py> FromPyObject<'a, 'py> for Targets {
-    type Error = PyErr;
-
-    fn extract(given: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
-        if let Ok(target) = given.cast::<Target>() {
-            return Ok(Self(vec![target.get().clone()]));
-        }
-        let all = given.try_iter()?.map(|target| Ok(target?.cast::<Target>()?.get().clone()));
-        all.collect::<PyResult<_>>().map(Self)
-    }
-}
 
 /// Results of `detect_many`, without the images that could not be read.
 pub struct Results<'py> {

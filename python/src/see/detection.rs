@@ -15,7 +15,6 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::arguments::Targets;
 use super::frames::seconds;
 use crate::boundary::arrays::{self, record};
 use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
@@ -23,7 +22,7 @@ use crate::boundary::image::Picture;
 use crate::boundary::text_file::save_text;
 use crate::pickles;
 use crate::targets::families;
-use crate::targets::target::Target;
+use crate::targets::target::{Target, Targets};
 
 /// Why an image, or a grid in it, has no labels.
 #[pyclass(frozen, module = "deltille", eq)]

@@ -12,12 +12,11 @@ use deltille::targets::SIDES;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::arguments::Targets;
 use super::detection::Detection;
 use super::frames::detected;
 use crate::boundary::arrays::whole;
 use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
-use crate::targets::target::Target;
+use crate::targets::target::{Target, Targets};
 
 /// Detects targets, or untagged boards, in images. Several threads can use one detector at the same time.
 ///

@@ -474,6 +474,21 @@ impl Target {
     }
 }
 
+/// A target, or several.
+pub struct Targets(pub Vec<Target>);
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Targets {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(target) = given.cast::<Target>() {
+            return Ok(Self(vec![target.get().clone()]));
+        }
+        let all = given.try_iter()?.map(|target| Ok(target?.cast::<Target>()?.get().clone()));
+        all.collect::<PyResult<_>>().map(Self)
+    }
+}
+
 /// A tag of a target.
 #[pyclass(frozen, get_all, module = "deltille", eq)]
 #[derive(Clone, PartialEq, Serialize, Deserialize)]
