@@ -129,3 +129,10 @@ def test_calibration_can_measure_the_target(detections, board, tmp_path):
     assert measured.is_measured and not board.is_measured
     off = numpy.abs(measured.corners - board.corners)
     assert 0 < off.max() < 0.1
+
+
+def test_solids_fit_their_paper():
+    one, two = (deltille.Octahedron(paper="A4", pages=pages) for pages in (None, 2))
+    assert two.corners.max() > 1.2 * one.corners.max()
+    with pytest.raises(deltille.TargetError, match="pages"):
+        deltille.Icosahedron(edge_mm=150, paper="A4", pages=3)
