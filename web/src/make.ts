@@ -59,6 +59,7 @@ export function make(): HTMLElement {
   const making = el("p", { class: "busy", hidden: true }, text.making);
   const space = el("div", { hidden: true }, solid, fold, making);
   const problem = el("p", { class: "problem", role: "alert", hidden: true });
+  const printing = el("p", { class: "hint" }, text.printing);
   const sheets = el("p", { class: "sheets", "aria-live": "polite" });
   const facts = el("p", { class: "facts", "aria-live": "polite" });
   const range = el("p", { class: "facts range", "aria-live": "polite" });
@@ -240,6 +241,7 @@ export function make(): HTMLElement {
 
   /** States the paper and the edge, and for larger paper the number of A4 pages. */
   function showSheets(drawn: Pages): void {
+    printing.textContent = isSolid(settings) && !settings.per_face ? text.printingNet : text.printing;
     if (!drawn.sheets) return void (sheets.textContent = "");
     const { paper, size_mm, pages: count, edge_mm } = drawn.sheets;
     const noun = ({ charuco: "square", aprilgrid: "tag", circles: "spacing" } as const)[settings.kind] ?? "tile";
@@ -396,7 +398,7 @@ export function make(): HTMLElement {
           "div",
           { class: "get" },
           el("div", { class: "buttons" }, pdf, verification.state),
-          el("p", { class: "hint" }, text.printing),
+          printing,
           more,
           el("div", { class: "buttons" }, seeIt),
           el("div", { class: "buttons quiet" }, link, el("button", { type: "button", click: store }, text.template)),

@@ -144,6 +144,7 @@ export const words = {
     making: "Building the solid…",
     printed: "The preview is not at true size. Print the PDF.",
     printing: "Print at 100 %, glue the sheet to a flat plate, and measure the check bars.",
+    printingNet: "Print at 100 %, measure the check bars, cut out the net, score and fold its dashed lines, and glue the numbered tabs.",
     link: "Copy a link to these settings",
     copied: "Copied.",
     inAddress: "The browser does not allow copying; the address bar now contains the link.",
