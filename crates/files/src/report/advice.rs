@@ -6,7 +6,7 @@ use crate::report::measures::survey::Survey;
 use deltille_calibrate::{CameraEstimate, Corner, Diagnosis, Excluded, Parameter, ViewEstimate};
 use deltille_core::camera::Lens;
 use deltille_core::setting::Setting::{
-    CalibrateModel, CalibrationBoardShape, CalibrationRefinePanels, SightingStretch,
+    CalibrateModel, CalibrationBoardShape, CalibrationRefinePanels, PrintScale,
 };
 use deltille_core::statistics::median;
 use deltille_core::words::counted;
@@ -128,7 +128,7 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     }
     if report.print.scale.is_none() {
         let text = format!(
-            "All distances scale with the print: measure both check bars of the sheet for {SightingStretch}. Focal \
+            "All distances scale with the print: measure both check bars of the sheet and set {PrintScale}. Focal \
              lengths and distortion do not change if both bars have the same scale error."
         );
         add(Weight::Hint, text);

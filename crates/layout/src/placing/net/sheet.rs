@@ -19,6 +19,7 @@ use deltille_core::setting::Setting::{
 };
 use deltille_core::targets::format_mm;
 use deltille_core::targets::{FamilyRef, Panel, SolidSpec, TargetError};
+use deltille_core::words::counted;
 
 /// Smallest face margin with room for numbers, mm.
 const MIN_MARGIN_MM: f64 = 2.5;
@@ -162,7 +163,11 @@ fn nested(
         let Some(page) = fit_upright(&least, &paper)? else { continue };
         let [left, lower, right, upper] = page.clear_mm();
         let room = DVec2::new(right - left - BLANK_MM, upper - lower - WORDS_MM - BLANK_MM);
-        if !is_last && area > most as f64 * room.element_product() {
+        let is_limited = !is_last || paper.pages.is_some();
+        if is_limited && area > most as f64 * room.element_product() {
+            if is_last {
+                return Err(too_many_pages(spec, &size.to_string(), most));
+            }
             continue;
         }
         let Some(Nested { net, places, pages: count }) = nest_on(&flat, drawing.sides, room) else {
@@ -171,13 +176,8 @@ fn nested(
         if count > most && !is_last {
             continue;
         }
-        if let Some(pages) = paper.pages.filter(|_| count > most) {
-            let problem = format!(
-                "the net of a solid with {} edges takes {count} pages of {size}, but {pages} are allowed: allow more, or use \
-                 a shorter {SolidEdgeMm} or a larger {PaperSize}",
-                format_mm(spec.edge_mm),
-            );
-            return Err(TargetError::invalid(PaperPages, problem));
+        if paper.pages.is_some() && count > most {
+            return Err(too_many_pages(spec, &size.to_string(), most));
         }
         if count > MAX_PAGES {
             let problem = format!(
@@ -221,6 +221,17 @@ fn nested(
         format_mm(spec.edge_mm),
     );
     Err(TargetError::invalid(SolidEdgeMm, problem))
+}
+
+/// Returns the error of a net that does not fit on the allowed number of pages.
+fn too_many_pages(spec: &SolidSpec, size: &str, most: usize) -> TargetError {
+    let problem = format!(
+        "the net of a solid with {} edges takes more than {} of {size}: allow more, or use a shorter {SolidEdgeMm} or a larger \
+         {PaperSize}",
+        format_mm(spec.edge_mm),
+        counted(most, "page"),
+    );
+    TargetError::invalid(PaperPages, problem)
 }
 
 /// Returns the convex outline of the tiles of a face, in the panel frame, mm.
