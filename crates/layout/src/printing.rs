@@ -133,7 +133,7 @@ impl Printing {
     /// Describes the pages, such as `page 297 × 210 mm (A4)` or `5 pages 210 × 297 mm (A4)`; empty without sheets.
     pub fn pages_in_words(&self) -> String {
         let Some(sheet) = self.sheets.first() else { return String::new() };
-        let page = sheet.pages.first().map_or(sheet, |page| &page.marks);
+        let page = sheet.first_page();
         let [width, height] = [page.width_mm, page.height_mm];
         let pages = match self.page_count() {
             1 => "page".to_owned(),

@@ -36,6 +36,11 @@ pub struct SheetLayout {
 }
 
 impl SheetLayout {
+    /// Returns the first printed page: the sheet itself, or the first of its pages.
+    pub fn first_page(&self) -> &Self {
+        self.pages.first().map_or(self, |page| &page.marks)
+    }
+
     /// Returns the number of pages on which the sheet is printed.
     pub fn page_count(&self) -> usize {
         self.pages.len().max(1)

@@ -341,7 +341,7 @@ impl Made {
     /// without sheets.
     pub fn sheets(&self) -> Option<String> {
         let sheet = self.printing.sheets.first()?;
-        let page = sheet.pages.first().map_or(sheet, |page| &page.marks);
+        let page = sheet.first_page();
         let size_mm = [page.width_mm, page.height_mm];
         let is_same = |paper: &PaperSize| {
             [paper.portrait_mm(), paper.landscape_mm()]

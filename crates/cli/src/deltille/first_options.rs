@@ -9,8 +9,8 @@ const FIRST: [(&[&str], &[&str]); 8] = [
     (
         &["board", "checkerboard"],
         &[
-            "rows", "cols", "edge", "family", "paper", "poster", "svg", "png", "threemf", "name",
-            "output",
+            "rows", "cols", "edge", "family", "paper", "poster", "pdf", "svg", "png", "threemf",
+            "laser", "name", "output",
         ],
     ),
     (
@@ -28,8 +28,10 @@ const FIRST: [(&[&str], &[&str]); 8] = [
             "asymmetric",
             "diameter",
             "paper",
+            "pdf",
             "svg",
             "png",
+            "laser",
             "name",
             "output",
         ],
@@ -41,30 +43,19 @@ const FIRST: [(&[&str], &[&str]); 8] = [
             "pdf", "gltf", "threemf", "name", "output",
         ],
     ),
-    (
-        &["detect"],
-        &["images", "target", "grid", "rows", "cols", "format", "overlay", "topic", "output"],
-    ),
+    (&["detect"], &["target", "grid", "rows", "cols", "format", "overlay", "topic", "output"]),
     (
         &["calibrate"],
-        &[
-            "inputs", "target", "model", "measured", "holdout", "report", "format", "topic",
-            "output",
-        ],
+        &["target", "model", "measured", "holdout", "report", "format", "topic", "output"],
     ),
-    (
-        &["rig"],
-        &["inputs", "camera", "topic", "target", "model", "measured", "known", "report", "output"],
-    ),
+    (&["rig"], &["camera", "topic", "target", "model", "measured", "known", "report", "output"]),
     (
         &["check", "accept", "pose", "handeye"],
         &[
-            "calibration",
-            "images",
-            "inputs",
             "camera",
             "topic",
             "target",
+            "measured",
             "limit",
             "lengths",
             "temperature",
@@ -74,10 +65,7 @@ const FIRST: [(&[&str], &[&str]); 8] = [
             "output",
         ],
     ),
-    (
-        &["guide"],
-        &["folder", "target", "model", "nearest", "farthest", "until", "once", "picture", "output"],
-    ),
+    (&["guide"], &["target", "model", "nearest", "farthest", "until", "once", "picture", "output"]),
 ];
 
 /// Returns a program whose commands list only these options after `-h`, and say how to list all. Limits of input files are

@@ -165,7 +165,7 @@ pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
     let images = Images::of(&args.images)?;
     let Place { folder, file } = output::place(&args.view.output, &["png"])?;
     ensure!(
-        file.is_none() || (images.is_single() && images.count().is_some()),
+        file.is_none() || images.is_one_photograph(),
         "-o: {} is one file, but there is not exactly one photograph; use a folder",
         args.view.output.display()
     );

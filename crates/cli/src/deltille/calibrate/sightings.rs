@@ -330,8 +330,7 @@ const MEASURED: Range = Range { least: 0.8, most: 1.25, unit: "" };
 impl Lengths {
     /// Returns the ratios of these lengths to those of the check bars on the first page, across and up.
     fn scale(self, sheets: &[SheetLayout]) -> anyhow::Result<[f64; 2]> {
-        let page =
-            sheets.first().map(|sheet| sheet.pages.first().map_or(sheet, |page| &page.marks));
+        let page = sheets.first().map(SheetLayout::first_page);
         let bars = page.map_or(&[][..], |page| &page.check_bars);
         let ratio = |direction: &str, is_across: bool, measured_mm: f64| {
             let is_it = |bar: &&CheckBar| {

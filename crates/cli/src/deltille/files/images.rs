@@ -103,6 +103,11 @@ impl Images {
         self.listed.is_none() && self.named.len() == 1
     }
 
+    /// Whether there is a single photograph, so that a result can be one file.
+    pub fn is_one_photograph(&self) -> bool {
+        self.is_single() && self.count().is_some()
+    }
+
     /// Iterates over all paths; an unreadable line ends the list with an error.
     pub fn iter(&self) -> impl Iterator<Item = anyhow::Result<PathBuf>> + Send + '_ {
         let after = self.listed.as_ref().map_or(0, |list| list.after);

@@ -41,8 +41,7 @@ pub struct Args {
 }
 
 /// Creates a board, writes its files, and verifies them.
-pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
-    let mut args = args;
+pub fn run(grid: GridKind, mut args: Args) -> anyhow::Result<ExitCode> {
     let file = args.delivery.take_file(&BoardSettings::ENDINGS)?;
     let given = args.settings.with(args.meshes, args.laser, args.finishing).for_file(file)?;
     let settings = match &args.template {

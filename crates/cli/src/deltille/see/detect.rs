@@ -439,9 +439,8 @@ impl Args {
             let endings: Vec<&str> = of_one.map(|format| format.name()).collect();
             let Place { folder, file } = output::place(output, &endings)?;
             if let Some(NamedFile { stem, ending }) = file {
-                let is_photograph = images.is_single() && images.count().is_some();
                 let named = DETECTION_FORMATS.iter().find(|format| format.name() == ending);
-                let named = named.filter(|_| is_photograph);
+                let named = named.filter(|_| images.is_one_photograph());
                 let named = named.with_context(|| {
                     format!(
                         "-o: {} must be a folder, because several files are written",
