@@ -198,6 +198,7 @@ macro_rules! whole {
                     page.poses = &solved.poses;
                     (page.diagnoses, page.stated) = (&solved.diagnoses, &solved.stated);
                     (page.print, page.models) = (solved.print, &solved.models);
+                    page.notes = solved.notes.clone();
                     page.html()
                 })?;
                 save_text(path, page, overwrite)

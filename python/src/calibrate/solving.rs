@@ -1,6 +1,6 @@
 //! Solves calibrations: checked arguments, and the work.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -13,6 +13,8 @@ use deltille::export::calibration::{Print, Residuals};
 use deltille::export::sheet::Sheet;
 use deltille::export::{calibration, rig};
 use deltille::layout::Printing;
+use deltille::raster::CameraNotes;
+use deltille::report::camera_notes;
 use deltille::{camera, detect, targets};
 use deltille_core::quantity::{board_accuracy_mm, distance_mm, edge_mm, print_scale};
 use pyo3::prelude::*;
@@ -300,6 +302,8 @@ pub struct Solved {
     pub stated: Vec<PanelPrior>,
     /// The models compared, by camera.
     pub models: Vec<Vec<Candidate>>,
+    /// Metadata of the photographs, by camera; absent if it was read from a file.
+    pub notes: BTreeMap<usize, CameraNotes>,
     pub targets: Vec<Printing>,
     /// Uncertainties of poses of the targets; empty if it was read from a file, which lists them.
     pub poses: Vec<PoseUncertainty>,
@@ -322,6 +326,7 @@ impl Solved {
             print: Print::default(),
             stated: Vec::new(),
             models,
+            notes: BTreeMap::new(),
             targets,
             poses: Vec::new(),
             model,
@@ -433,6 +438,7 @@ pub fn solve(
     let (mut all, mut named) = (Vec::new(), Vec::new());
     let (mut left_out, mut ink, mut panels) = (Vec::new(), Vec::new(), Vec::new());
     let is_named = cameras.len() > 1;
+    let mut notes = BTreeMap::new();
     {
         if let [only] = seen.printed() {
             how.sheet.sheets = only.sheets.clone();
@@ -452,6 +458,8 @@ pub fn solve(
                 let ink = found.ink?;
                 Some(if let Seen::Grid(grid) = &*seen { ink.on_print(grid.edge_mm) } else { ink })
             }));
+            let photographs = camera.detections.iter().map(|(_, found)| found);
+            notes.extend(camera_notes(photographs).map(|notes| (all.len(), notes)));
             if how.assume_target {
                 assume(&mut camera.detections, reference.targets());
             }
@@ -540,6 +548,7 @@ pub fn solve(
         print,
         stated,
         models,
+        notes,
         targets,
         poses,
         model,

@@ -11,7 +11,7 @@ use deltille_core::targets::Target;
 use deltille_files::export::calibration::{Print, Residuals};
 use deltille_files::export::sheet::Sheet;
 use deltille_files::export::{calibration, camera, detection, next_view, saved};
-use deltille_files::report::{Report, Survey};
+use deltille_files::report::{Report, Survey, camera_notes};
 use deltille_layout::Printing;
 use wasm_bindgen::prelude::*;
 
@@ -73,6 +73,8 @@ impl Solved {
         let models = [calibration.compare_models(0).unwrap_or_default()];
         (page.diagnoses, page.stated) = (&diagnoses, calibration.panels());
         (page.print, page.models, page.poses) = (print, &models, &poses);
+        page.notes
+            .extend(camera_notes(read.iter().map(|(_, found)| found)).map(|notes| (0, notes)));
         let figures = serde_json::json!({
             "rms_px": found.rms_px, "views": found.views.len(), "corners": found.corner_count(),
             "names": found.camera.parameter_names(), "values": found.camera.parameters(),

@@ -7,6 +7,7 @@ use crate::report::pictures::sample::Sample;
 use deltille_calibrate::{
     CameraEstimate, Candidate, Diagnosis, Estimate, Messages, PanelPrior, PoseUncertainty,
 };
+use deltille_core::detection::Detection;
 use deltille_core::raster::CameraNotes;
 
 /// The contents of the report of a calibration.
@@ -37,6 +38,14 @@ pub struct Report<'a> {
     pub models: &'a [Vec<Candidate>],
     /// Uncertainties of poses of the targets; see [`Estimate::pose_uncertainties`].
     pub poses: &'a [PoseUncertainty],
+}
+
+/// Returns the metadata of the photographs of a camera that state its focal length; `None` if there are none.
+pub fn camera_notes<'a>(
+    detections: impl IntoIterator<Item = &'a Detection>,
+) -> Option<CameraNotes> {
+    let mut notes = detections.into_iter().filter_map(|found| found.file.camera.as_ref());
+    notes.find(|notes| notes.focal_mm.is_some() && notes.focal_35mm_mm.is_some()).cloned()
 }
 
 impl<'a> Report<'a> {

@@ -28,7 +28,7 @@ mod sections;
 
 pub use advice::{Advice, Weight, advice};
 pub use certificate::Certificate;
-pub use content::Report;
+pub use content::{Report, camera_notes};
 pub use measures::survey::{Survey, SurveyedView};
 pub use pictures::sample::Sample;
 pub use pictures::thumbnail::thumbnail;

@@ -27,7 +27,7 @@ use deltille::export::calibration::{Print, Residuals};
 use deltille::export::camera::FormatError;
 use deltille::layout::Printing;
 use deltille::raster::CameraNotes;
-use deltille::report::target_map_svg;
+use deltille::report::{camera_notes, target_map_svg};
 use deltille::targets::{self, parse_length_mm};
 use deltille_core::quantity::board_accuracy_mm;
 use deltille_core::words::counted;
@@ -311,9 +311,8 @@ pub fn print_diagnoses(words: &Messages<'_>, diagnoses: &[Diagnosis]) {
 impl Calibrated {
     /// Adds the metadata of a camera's photographs that state its focal length.
     pub fn add_notes(&mut self, camera: usize, detections: &[(String, Detection)]) {
-        let mut notes = detections.iter().filter_map(|(_, found)| found.file.camera.as_ref());
-        let notes = notes.find(|notes| notes.focal_mm.is_some() && notes.focal_35mm_mm.is_some());
-        self.notes.extend(notes.map(|notes| (camera, notes.clone())));
+        let notes = camera_notes(detections.iter().map(|(_, found)| found));
+        self.notes.extend(notes.map(|notes| (camera, notes)));
     }
 
     /// Prints the diagnoses on standard error. Fails if the images were not taken by a fixed camera.
