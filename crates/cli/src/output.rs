@@ -63,19 +63,23 @@ pub fn place(output: &Path, endings: &[&str]) -> anyhow::Result<Place> {
     Ok(Place { folder: folder_of(output).to_owned(), file })
 }
 
-/// Returns the stem of the output files, and the extension of the file given by `-o` (empty without one). Rejects a `--name` that
-/// differs from the stem of that file.
-pub fn named_by(
-    name: Option<String>,
-    file: Option<NamedFile>,
-) -> anyhow::Result<(Option<String>, String)> {
-    let Some(NamedFile { stem, ending }) = file else { return Ok((name, String::new())) };
+/// Sets the stem of the output files to that of the file given by `-o`, and returns its extension (empty without one). Rejects a
+/// `--name` that differs.
+pub fn named_by(name: &mut Option<String>, file: Option<NamedFile>) -> anyhow::Result<String> {
+    let Some(NamedFile { stem, ending }) = file else { return Ok(String::new()) };
     Name::without_dots(&stem).map_err(|why| anyhow!("-o: {why}"))?;
-    match name.filter(|name| *name != stem) {
+    match name.replace(stem.clone()).filter(|name| *name != stem) {
         Some(name) => bail!(
             "--name: -o already names the files {stem}; remove --name {name}, or use a folder as -o"
         ),
-        None => Ok((Some(stem), ending)),
+        None => Ok(ending),
+    }
+}
+
+/// Requests the format with this extension, if it is one of these.
+pub fn request<const N: usize>(ending: &str, formats: [(&str, &mut bool); N]) {
+    for (known, is_requested) in formats {
+        *is_requested |= known == ending;
     }
 }
 

@@ -8,7 +8,7 @@ use anyhow::{Context, ensure};
 use crate::deltag::named::resolve;
 use crate::deltille::files::written::{Formats, drawn, write_all};
 use crate::interrupt;
-use crate::output::{self, Overwrite, Place, named_by, report, say};
+use crate::output::{self, Overwrite, Place, named_by, report, request, say};
 use crate::run::{FAILED, Interrupted};
 use crate::values::{Ids, name, whole};
 use deltille::layout::{DEFAULT_MARGIN_MM, PaperSize, PaperSpec, Printing};
@@ -82,9 +82,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         ..PaperSpec::default()
     };
     let Place { folder, file } = output::place(&args.output, &["pdf", "svg", "png"])?;
-    let (named, ending) = named_by(args.name, file)?;
-    let [pdf, svg, png] = [("pdf", args.pdf), ("svg", args.svg), ("png", args.png)]
-        .map(|(format, is_asked)| is_asked || ending == format);
+    let (mut named, mut pdf, mut svg, mut png) = (args.name, args.pdf, args.svg, args.png);
+    let ending = named_by(&mut named, file)?;
+    request(&ending, [("pdf", &mut pdf), ("svg", &mut svg), ("png", &mut png)]);
     ensure!(args.dpi.is_none() || png, "--dpi needs --png");
     if let Some(ids) = &args.ids {
         ids.check(&family)?;

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 use anyhow::Context;
 
 use crate::deltag::named::resolve;
-use crate::output::{self, Overwrite, Place, named_by, report};
+use crate::output::{self, Overwrite, Place, named_by, report, request};
 use crate::values::{Ids, name, whole};
 use deltille::artwork::{Artwork, GalleryTile, tag_gallery};
 use deltille::export::kind::Kind;
@@ -54,13 +54,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         "--ids: at most {MAX_TAGS} tags fit in one image; use `deltag sheet` for more"
     );
     let Place { folder, file } = output::place(&args.output, &["svg", "png"])?;
-    let (named, ending) = named_by(args.name, file)?;
-    let png = args.png || ending == "png";
+    let (mut named, mut svg, mut png) = (args.name, args.svg, args.png);
+    let ending = named_by(&mut named, file)?;
+    request(&ending, [("svg", &mut svg), ("png", &mut png)]);
     anyhow::ensure!(args.dpi.is_none() || png, "--dpi needs --png");
     let stem = named.as_deref().unwrap_or(family.name());
     let place = |extension| folder.join(format!("{stem}.{extension}"));
     let png_path = png.then(|| place("png"));
-    let svg_path = (args.svg || !png || ending == "svg").then(|| place("svg"));
+    let svg_path = (svg || !png).then(|| place("svg"));
     let kinds = [(&png_path, Kind::own_printed_png()), (&svg_path, Kind::of(svg::HEAD.as_bytes()))];
     for (path, kind) in kinds {
         let Some(path) = path else { continue };

@@ -11,7 +11,7 @@ use super::settings::logo;
 use super::settings::meshes::Meshes;
 use super::settings::option_checks::refuse_idle;
 use crate::deltille::files::written::{File, Formats, drawn, text_file};
-use crate::output::named_by;
+use crate::output::{named_by, request};
 use crate::values::{name, whole};
 use deltille::family::Family;
 use deltille::layout::{self, DEFAULT_MARGIN_MM, PaperSize, PaperSpec};
@@ -72,14 +72,10 @@ impl PrintingArgs {
         let of_meshes = if meshes.is_some() { Meshes::ENDINGS.as_slice() } else { &[] };
         let file =
             self.delivery.take_file(&[&["json", "pdf", "svg", "png"], of_meshes].concat())?;
-        let (name, ending) = named_by(self.name.take(), file)?;
-        self.name = name;
-        match ending.as_str() {
-            "pdf" => self.pdf = true,
-            "svg" => self.svg = true,
-            "png" => self.png = true,
-            of_mesh => meshes.into_iter().for_each(|meshes| meshes.request(of_mesh)),
-        }
+        let ending = named_by(&mut self.name, file)?;
+        let Self { pdf, svg, png, .. } = self;
+        request(&ending, [("pdf", pdf), ("svg", svg), ("png", png)]);
+        meshes.into_iter().for_each(|meshes| meshes.request(&ending));
         Ok(())
     }
 

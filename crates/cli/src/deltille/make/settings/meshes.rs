@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::option_checks::{is_false, length, refuse_idle};
 use crate::deltille::files::written::{File, bytes_file};
-use crate::output::log;
+use crate::output::{log, request};
 use crate::values::{number, whole};
 use deltille::export::artifacts::{Making, What, make, of_mesh};
 use deltille::export::inlay::InlaidBodies;
@@ -115,16 +115,17 @@ impl Meshes {
 
     /// Requests the mesh with this extension, if it is one of [`ENDINGS`](Self::ENDINGS).
     pub fn request(&mut self, ending: &str) {
-        match ending {
-            "glb" => self.gltf = true,
-            "obj" => self.obj = true,
-            "sdf" => self.sdf = true,
-            "urdf" => self.urdf = true,
-            "xml" => self.mjcf = true,
-            "usda" => self.usd = true,
-            "3mf" => self.threemf = true,
-            _ => {}
-        }
+        let Self { gltf, obj, sdf, urdf, mjcf, usd, threemf, .. } = self;
+        let formats = [
+            ("glb", gltf),
+            ("obj", obj),
+            ("sdf", sdf),
+            ("urdf", urdf),
+            ("xml", mjcf),
+            ("usda", usd),
+            ("3mf", threemf),
+        ];
+        request(ending, formats);
     }
 
     /// Whether any mesh is requested.

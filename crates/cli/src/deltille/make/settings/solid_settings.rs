@@ -12,7 +12,7 @@ use super::finishing::Laser;
 use super::meshes::Meshes;
 use super::option_checks::{is_false, is_usual, length, refuse_idle};
 use super::{logo, template};
-use crate::output::{NamedFile, named_by};
+use crate::output::{NamedFile, named_by, request};
 use crate::values::{number, whole};
 use deltille::export::dsc::Dialect;
 use deltille::family::positions;
@@ -269,16 +269,10 @@ impl SolidSettings {
 
     /// Returns these settings with the name and the format of the file that `-o` names.
     pub fn for_file(mut self, file: Option<NamedFile>) -> anyhow::Result<Self> {
-        let (name, ending) = named_by(self.name.take(), file)?;
-        self.name = name;
-        match ending.as_str() {
-            "pdf" => self.pdf = true,
-            "svg" => self.svg = true,
-            "png" => self.png = true,
-            "dsc" => self.dsc = true,
-            "stl" => self.stl = true,
-            of_mesh => self.meshes.request(of_mesh),
-        }
+        let ending = named_by(&mut self.name, file)?;
+        let Self { pdf, svg, png, dsc, stl, .. } = &mut self;
+        request(&ending, [("pdf", pdf), ("svg", svg), ("png", png), ("dsc", dsc), ("stl", stl)]);
+        self.meshes.request(&ending);
         Ok(self)
     }
 
