@@ -199,6 +199,11 @@ macro_rules! detail {
 }
 pub(crate) use detail;
 
+/// Returns the line about a written file.
+pub(crate) fn wrote(path: &Path) -> String {
+    format!("wrote {}", path.strip_prefix(".").unwrap_or(path).display())
+}
+
 /// Output format of a command.
 #[derive(clap::Args, Clone, Copy, Default)]
 pub struct ResultFormat {

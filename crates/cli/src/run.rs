@@ -45,7 +45,7 @@ pub fn run_with<A: Parser>(
 ) -> ExitCode {
     interrupt::listen();
     wording::install();
-    let arguments = without_help_of_help(arguments);
+    let arguments = with_help_option(arguments);
     let mut command = with_short_help(with_negative_numbers(A::command()));
     let parsed = command.try_get_matches_from_mut(&arguments).and_then(|matches| {
         wording::set_command(&command, &matches);
@@ -117,10 +117,12 @@ fn with_negative_numbers(command: Command) -> Command {
         .mut_subcommands(with_negative_numbers)
 }
 
-/// Returns the arguments without `--help` after `help`, which means the same.
-fn without_help_of_help(mut arguments: Vec<OsString>) -> Vec<OsString> {
+/// Returns the arguments with `help COMMAND` replaced by `COMMAND --help`, which also suggests a similar command.
+fn with_help_option(mut arguments: Vec<OsString>) -> Vec<OsString> {
     if arguments.get(1).is_some_and(|command| command == "help") {
+        arguments.remove(1);
         arguments.retain(|argument| argument != "--help" && argument != "-h");
+        arguments.push("--help".into());
     }
     arguments
 }

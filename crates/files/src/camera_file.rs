@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use deltille_core::camera::{Camera, CameraFile, CameraFileError};
 use deltille_core::json;
 
-use crate::export::staging;
+use crate::export::saved::{self, SavedError};
+use crate::export::{calibration, rig, staging};
 use crate::limits::{Limits, MAX_SETTINGS_BYTES, ReadError};
 
 /// Error of reading a camera.
@@ -19,12 +20,28 @@ pub enum CameraReadError {
     #[error(transparent)]
     Read(#[from] ReadError),
     /// A file of another kind.
-    #[error("{}: this is a {schema} file, not a camera: use the .yaml that `deltille calibrate` wrote", path.display())]
+    #[error("{}: this is a {schema} file, not a camera: use the .yaml or .json that `deltille calibrate` wrote", path.display())]
     Kind {
         /// The file.
         path: PathBuf,
         /// Its schema.
         schema: String,
+    },
+    /// The file is not a valid calibration.
+    #[error("{}: {error}", path.display())]
+    Calibration {
+        /// The file.
+        path: PathBuf,
+        /// The problem.
+        error: SavedError,
+    },
+    /// The calibration of a rig, which has several cameras.
+    #[error("{}: this is a rig of {cameras} cameras: use the .yaml of one of them", path.display())]
+    Rig {
+        /// The file.
+        path: PathBuf,
+        /// Number of its cameras.
+        cameras: usize,
     },
     /// The file is not a valid camera.
     #[error("{}: {error}", path.display())]
@@ -44,7 +61,8 @@ pub fn read(path: &Path) -> Result<Camera, CameraReadError> {
     read_with_targets(path).map(|file| file.camera)
 }
 
-/// Reads a camera file of this program, ROS or OpenCV. Leftovers of killed runs in its folder are cleaned up first.
+/// Reads a camera file of this program, ROS or OpenCV, or the camera of a calibration (the .json beside it). Leftovers of
+/// killed runs in its folder are cleaned up first.
 ///
 /// # Errors
 /// Returns an error if the file cannot be read, or does not contain a camera.
@@ -53,11 +71,28 @@ pub fn read_with_targets(path: &Path) -> Result<CameraFile, CameraReadError> {
     staging::settle(folder.unwrap_or(Path::new("."))).map_err(CameraReadError::Settle)?;
     let text = Limits::default().read_text(path)?;
     if let Ok(Some(schema)) = json::schema(text.as_bytes()) {
-        return Err(CameraReadError::Kind { path: path.to_owned(), schema });
+        return match [calibration::SCHEMA, rig::SCHEMA].contains(&schema.as_str()) {
+            true => of_calibration(path, &text),
+            false => Err(CameraReadError::Kind { path: path.to_owned(), schema }),
+        };
     }
     if text.len() > MAX_SETTINGS_BYTES {
         return Err(ReadError::TooLong { path: path.to_owned(), most: MAX_SETTINGS_BYTES }.into());
     }
     let yaml = |error| CameraReadError::Yaml { path: path.to_owned(), error };
     CameraFile::from_yaml(&text).map_err(yaml)
+}
+
+/// The only camera of a calibration.
+fn of_calibration(path: &Path, text: &str) -> Result<CameraFile, CameraReadError> {
+    let wrong = |error| CameraReadError::Calibration { path: path.to_owned(), error };
+    let mut found = saved::read_without_target(text).map_err(wrong)?;
+    match (found.cameras.len(), found.cameras.pop()) {
+        (1, Some(only)) => Ok(CameraFile {
+            camera: only.camera,
+            calibrated_with: found.calibrated_with,
+            failed: saved::failures(text).into_iter().next(),
+        }),
+        (cameras, _) => Err(CameraReadError::Rig { path: path.to_owned(), cameras }),
+    }
 }

@@ -360,10 +360,10 @@ impl Detection {
     /// pathlib.Path
     #[pyo3(signature = (path, format = "json", *, overwrite = false))]
     fn save(&self, path: PathBuf, format: &str, overwrite: bool) -> PyResult<PathBuf> {
-        let target = self.targets.first().map(|target| target.target());
+        let targets: Vec<_> = self.targets.iter().map(|target| target.target()).collect();
         let of_image = DETECTION_FORMATS.iter().filter(|format| format.is_of_one_image());
         let format = named(of_image, format).map_err(raised::DetectionError::new_err)?;
-        let text = format.text(&self.found, target).unwrap_or_default();
+        let text = format.text(&self.found, &targets).unwrap_or_default();
         save_text(path, text, overwrite)
     }
 

@@ -160,7 +160,7 @@ impl Found {
 
     /// Returns the detection as a CSV table.
     pub fn csv(&self) -> String {
-        csv::write(&self.detection)
+        csv::write(&self.detection, &self.target.iter().collect::<Vec<_>>())
     }
 
     /// Returns the detection in the ORPC format of the reference detector.

@@ -1,8 +1,7 @@
 //! Calibrates a camera from corners and writes its report.
 
 use deltille_calibrate::{
-    self, Calibration, HoldStatus, HoldTracker, Intrinsics, Messages, Model, NextView, Reference,
-    View, views,
+    self, Calibration, HoldStatus, HoldTracker, Intrinsics, Model, NextView, Reference, View, views,
 };
 use deltille_core::camera::{CameraFile, Pose};
 use deltille_core::detection::{Detection, InkEstimate};
@@ -65,8 +64,6 @@ impl Solved {
         estimate.excluded.splice(0..0, shown.excluded.into_iter().map(|(_, out)| out));
         let found =
             estimate.cameras.first().ok_or_else(|| JsError::new("no camera was calibrated"))?;
-        let words = Messages::new(&estimate, print.scale);
-        let said = diagnoses.iter().map(|diagnosis| one_line(&words.sentence(diagnosis))).collect();
         let poses = estimate.pose_uncertainties(std::slice::from_ref(&target));
         let mut page = Report::new("camera", &estimate);
         // Having too few views to compare models is not an error.
@@ -93,8 +90,8 @@ impl Solved {
             json,
             opencv: camera::opencv(&found.camera).ok(),
             ros: camera::ros(&found.camera, "camera").ok(),
+            said: page.warnings().iter().map(one_line).collect(),
             page: page.html(),
-            said,
             figures: figures.to_string(),
         })
     }
@@ -124,7 +121,7 @@ impl Solved {
         self.page.clone()
     }
 
-    /// Returns the diagnoses, in sentences.
+    /// Returns what makes the figures unreliable, in sentences.
     pub fn said(&self) -> Vec<String> {
         self.said.clone()
     }

@@ -137,6 +137,15 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     found
 }
 
+impl Report<'_> {
+    /// Returns what makes the figures unreliable, with remedies: the warnings of the page.
+    pub fn warnings(&self) -> Vec<String> {
+        let surveys: Vec<Survey> = self.estimate.cameras.iter().map(Survey::new).collect();
+        let all = advice(self, &surveys).into_iter();
+        all.filter(|piece| piece.weight == Weight::Warning).map(|piece| piece.text).collect()
+    }
+}
+
 /// A text about a camera, prefixed with its name if there are several cameras.
 fn of_camera(report: &Report, camera: &CameraEstimate, text: String) -> String {
     // The text of a diagnosis names its camera.

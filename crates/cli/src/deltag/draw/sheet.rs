@@ -114,7 +114,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let files = drawn(&name, artwork, formats, args.dpi.unwrap_or(300));
     let written = write_all(&folder, &files, args.overwrite)?;
     for path in &written {
-        report!("wrote {}", path.display());
+        report!("{}", output::wrote(path));
     }
     if args.no_verify {
         return Ok(ExitCode::SUCCESS);

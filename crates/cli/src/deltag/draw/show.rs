@@ -85,7 +85,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         written.push(path);
     }
     for path in written {
-        report!("wrote {}", path.display());
+        report!("{}", output::wrote(&path));
     }
     Ok(ExitCode::SUCCESS)
 }

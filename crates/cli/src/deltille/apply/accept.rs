@@ -8,7 +8,7 @@ use anyhow::{Context, anyhow};
 
 use super::new_views::NewViewsArgs;
 use crate::interrupt;
-use crate::output::{self, Overwrite, log};
+use crate::output::{self, Overwrite, log, report};
 use crate::run::{FAILED, UNDECIDED};
 use deltille::calibrate::{
     Acceptance, AcceptanceRequest, Conformity, CornerLabel, KnownLength, Limit, Temperature,
@@ -104,6 +104,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         output::write(page, certificate.html().as_bytes(), args.overwrite).context("--report")?;
     }
     output::print(&describe(&found))?;
+    for path in path.iter().chain(&page) {
+        report!("{}", output::wrote(path));
+    }
     Ok(match found.verdict() {
         None | Some(Conformity::Conforms) => ExitCode::SUCCESS,
         Some(Conformity::Fails) => ExitCode::from(FAILED),

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use super::new_views::NewViewsArgs;
 use crate::interrupt;
-use crate::output::{self, Overwrite, log};
+use crate::output::{self, Overwrite, log, report};
 use crate::run::{FAILED, UNDECIDED};
 use deltille::calibrate::{Answer, Check, Missing, QuantityTest, Suspect};
 use deltille::export::check;
@@ -44,6 +44,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         output::write(path, check::write(&found).as_bytes(), args.overwrite)?;
     }
     output::print(&describe(&found))?;
+    if let Some(path) = &path {
+        report!("{}", output::wrote(path));
+    }
     if interrupt::has_ended_input() {
         return Ok(ExitCode::from(interrupt::exit_code()));
     }

@@ -10,7 +10,7 @@ use crate::deltille::calibrate::sightings::{Sightings, SightingsArgs};
 use crate::deltille::calibrate::solving::print_diagnoses;
 use crate::deltille::files::camera_file;
 use crate::interrupt;
-use crate::output::{self, Overwrite, log};
+use crate::output::{self, Overwrite, log, report};
 use crate::run::FAILED;
 use deltille::calibrate::{
     CameraEstimate, Contradiction, Diagnosis, HandEye, HandEyeRequest, Intrinsics, Messages, Model,
@@ -110,9 +110,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     print_warnings(&found);
     output::write(&path, hand_eye::write(&found).as_bytes(), args.overwrite)?;
-    output::print(
-        &(describe(&found) + &format!("wrote {}\n", shown(&path.display().to_string()))),
-    )?;
+    output::print(&describe(&found))?;
+    report!("{}", output::wrote(&path));
     if interrupt::has_ended_input() {
         return Ok(ExitCode::from(interrupt::exit_code()));
     }

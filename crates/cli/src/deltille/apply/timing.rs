@@ -12,11 +12,10 @@ use crate::deltille::calibrate::{compensation, sightings};
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::{camera_file, target_file};
 use crate::interrupt;
-use crate::output::{self, Overwrite, log};
+use crate::output::{self, Overwrite, log, report};
 use deltille::calibrate::{Estimate, Reference, TimedCamera, timing};
 use deltille::export::kind::Kind;
 use deltille::export::timing as timing_file;
-use deltille_core::words::shown;
 
 /// Arguments of `deltille timing`.
 #[derive(clap::Args)]
@@ -89,7 +88,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     found.warnings().iter().for_each(|said| log!("warning: {said}"));
     output::print(&compensation::describe(&found))?;
     if let Some(path) = &path {
-        output::print(&format!("wrote {}\n", shown(&path.display().to_string())))?;
+        report!("{}", output::wrote(path));
     }
     if interrupt::has_ended_input() {
         return Ok(ExitCode::from(interrupt::exit_code()));

@@ -356,7 +356,7 @@ impl Made {
             };
         }
         for path in staged.commit()? {
-            report!("wrote {}", path.display());
+            report!("{}", output::wrote(&path));
         }
         if is_left {
             return Err(Interrupted(format!("{} written", counted(done, "image"))).into());

@@ -9,7 +9,7 @@ use glam::DVec2;
 
 use crate::deltille::files::camera_file;
 use crate::deltille::files::written::{File, check_places, sample_of, text_file, write_all};
-use crate::output::{self, Overwrite, log};
+use crate::output::{self, Overwrite, log, report};
 use crate::run::{FAILED, UNDECIDED};
 use crate::values::distance;
 use deltille::calibrate::{
@@ -118,15 +118,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             }
         );
     }
+    let mut written = Vec::new();
     if let Some(path) = &path {
         let names: Vec<&str> = pairs.iter().map(|(one, _)| one.name.as_str()).collect();
         let json = comparison::write(&names, &found, &motions);
         let files = files(path, &pairs, &found, &json);
-        for path in write_all(output::folder_of(path), &files, args.overwrite)? {
-            let _ = writeln!(text, "wrote {}", shown(&path.display().to_string()));
-        }
+        written = write_all(output::folder_of(path), &files, args.overwrite)?;
     }
     output::print(&text)?;
+    for path in written {
+        report!("{}", output::wrote(&path));
+    }
     Ok(match Verdict::of(&found, &motions, args.tolerance) {
         Verdict::Changed => ExitCode::from(FAILED),
         Verdict::Undecided => ExitCode::from(UNDECIDED),

@@ -18,7 +18,7 @@ use crate::deltille::files::written::{
     File, check_places, keep_inputs, same_file, sample_of, text_file, write_all,
 };
 use crate::interrupt;
-use crate::output::{self, Overwrite, log};
+use crate::output::{self, Overwrite, log, report};
 use crate::run::{FAILED, report};
 use crate::values::format;
 use deltille::calibrate::{CameraEstimate, Estimate, Intrinsics, Model, PoseUncertainty, Source};
@@ -180,10 +180,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "held out: {}", headline(test));
     }
-    for path in written {
-        let _ = writeln!(text, "wrote {}", shown(&path.display().to_string()));
-    }
     output::print(&text)?;
+    for path in written {
+        report!("{}", output::wrote(&path));
+    }
     if interrupt::has_ended_input() {
         return Ok(ExitCode::from(interrupt::exit_code()));
     }

@@ -215,7 +215,7 @@ pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
         say!("{line}");
     }
     for path in written {
-        report!("wrote {}", path.display());
+        report!("{}", output::wrote(&path));
     }
     if interrupt::has_ended_input() {
         return Ok(ExitCode::from(interrupt::exit_code()));

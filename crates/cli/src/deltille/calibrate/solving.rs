@@ -166,6 +166,10 @@ impl ModelChoice {
                 error.into()
             }
             CalibrationError::WrongConstraints { .. } => error.into(),
+            CalibrationError::TooFewViews { .. } => anyhow!(
+                "{} are too few for --model auto, which tests each model on a third of them: name a model, such as radtan",
+                counted(calibration.cameras()[camera].views.len(), "view")
+            ),
             _ => anyhow!(error).context(AUTO),
         })?;
         calibration.set_intrinsics(camera, model);

@@ -11,8 +11,8 @@ use super::verify::{self, Proof};
 use crate::deltille::files::limits::FileLimits;
 use crate::deltille::files::target_file;
 use crate::deltille::files::written::{File, same_file, write_all};
-use crate::output::{self, NamedFile, Overwrite, Place, ResultFormat, report};
-use deltille::layout::Printing;
+use crate::output::{self, NamedFile, Overwrite, Place, ResultFormat, log, report};
+use deltille::layout::{Printing, Reach};
 use deltille::limits::Limits;
 use deltille::targets::Target;
 use deltille::verify::{Format, whole_of};
@@ -96,13 +96,14 @@ impl Delivery {
         summary: &str,
     ) -> anyhow::Result<ExitCode> {
         let target = &printing.target;
+        warn_of_fine_print(printing)?;
         let written = write_all(&self.output, files, self.overwrite)?;
         if !self.result_format.is_json() {
             for line in summary.lines() {
                 report!("{line}");
             }
             for path in &written {
-                report!("wrote {}", path.display());
+                report!("{}", output::wrote(path));
             }
         }
         // A simulator model is verified together with the OBJ that it uses.
@@ -132,6 +133,22 @@ impl Delivery {
         }
         Ok(code)
     }
+}
+
+/// Smallest detail of a print without a warning, mm. Ink spreads by about 0.05 mm on each side, a fifth of this length.
+const FINE_MM: f64 = 0.5;
+
+/// Warns if details of the printed sheets are so small that ink spread changes their shape.
+fn warn_of_fine_print(printing: &Printing) -> anyhow::Result<()> {
+    let Reach { detail_mm, tags, .. } = Reach::of(&printing.target)?;
+    if !printing.sheets.is_empty() && detail_mm < FINE_MM {
+        let details = if tags > 0 { "cells of tags" } else { "tiles" };
+        log!(
+            "warning: {details} are {detail_mm:.2} mm wide: most printers cannot resolve them; use fewer rows and \
+             columns, larger paper, or a film or glass master"
+        );
+    }
+    Ok(())
 }
 
 /// Whether a file is verified on its own, and not as a part of another.

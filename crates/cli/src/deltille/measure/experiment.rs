@@ -10,10 +10,10 @@ use clap::Subcommand;
 use crate::deltille::files::images::Images;
 use crate::deltille::files::target_file;
 use crate::deltille::files::written::{bytes_file, text_file, write_all};
-use crate::output::{Overwrite, report, say};
+use crate::output::{self, Overwrite, report, say};
 use crate::run::Interrupted;
 use crate::values::whole;
-use crate::{interrupt, output, progress};
+use crate::{interrupt, progress};
 use deltille::detect::Tone;
 use deltille::family;
 use deltille::limits::Limits;
@@ -231,7 +231,8 @@ fn run_guide(args: GuideArgs) -> anyhow::Result<ExitCode> {
     };
     let path = simulation.output.join("guide.csv");
     output::write(&path, guide::csv(&outcome).as_bytes(), simulation.overwrite)?;
-    output::print(&format!("{}wrote {}\n", guide::text(setup, &outcome), path.display()))?;
+    output::print(&guide::text(setup, &outcome))?;
+    report!("{}", output::wrote(&path));
     Ok(ExitCode::SUCCESS)
 }
 
@@ -246,7 +247,8 @@ fn run_rig(args: RigArgs) -> anyhow::Result<ExitCode> {
     };
     let path = simulation.output.join("rig.csv");
     output::write(&path, rig::csv(&outcomes).as_bytes(), simulation.overwrite)?;
-    output::print(&format!("{}wrote {}\n", rig::text(&outcomes), path.display()))?;
+    output::print(&rig::text(&outcomes))?;
+    report!("{}", output::wrote(&path));
     Ok(ExitCode::SUCCESS)
 }
 
@@ -265,7 +267,8 @@ fn run_states(args: StatesArgs) -> anyhow::Result<ExitCode> {
     };
     let path = simulation.output.join("states.csv");
     output::write(&path, states::csv(&outcome).as_bytes(), simulation.overwrite)?;
-    output::print(&format!("{}wrote {}\n", states::text(&outcome), path.display()))?;
+    output::print(&states::text(&outcome))?;
+    report!("{}", output::wrote(&path));
     Ok(ExitCode::SUCCESS)
 }
 
@@ -291,7 +294,7 @@ fn run_corners(args: CornersArgs) -> anyhow::Result<ExitCode> {
         bytes_file("corners.png".to_owned(), png),
     ];
     for path in write_all(folder, &files, simulation.overwrite)? {
-        report!("wrote {}", path.display());
+        report!("{}", output::wrote(&path));
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -334,7 +337,7 @@ fn run_photographs(args: PhotographsArgs) -> anyhow::Result<ExitCode> {
         text_file("photographs.svg".to_owned(), svg),
     ];
     for path in write_all(&simulation.output, &files, simulation.overwrite)? {
-        report!("wrote {}", path.display());
+        report!("{}", output::wrote(&path));
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -517,8 +517,9 @@ fn one_image(
     let Photograph { image, notes } = frame.read(&limits, args.accept_damaged)?;
     let mut found = finder.detect(&image, &name);
     (found.file, found.time_ns) = (notes, time_ns);
+    let sought: Vec<&Target> = targets.iter().collect();
     let text = |format: &&DetectionFormat| {
-        let text = format.text(&found, targets.first())?;
+        let text = format.text(&found, &sought)?;
         Some((args.path(&stem, format.name())?, text.into_bytes()))
     };
     let mut files: Vec<(PathBuf, Vec<u8>)> = args.format.iter().filter_map(text).collect();

@@ -200,7 +200,10 @@ impl SolidSpec {
 
     /// Checks each number on its own.
     pub(crate) fn check(&self) -> Result<(), TargetError> {
-        if !SOLID_EDGE_MM.contains(&self.edge_mm) {
+        // The mean edge of a cuboid that is not scaled follows from its sides, which are checked below.
+        let follows =
+            matches!(&self.shape, SolidShape::Cuboid(sides) if mean_side(*sides) == self.edge_mm);
+        if !follows && !SOLID_EDGE_MM.contains(&self.edge_mm) {
             let edge = format_mm(self.edge_mm);
             let problem = match &self.shape {
                 SolidShape::Mesh(_) => {

@@ -2,27 +2,32 @@
 //!
 //! Columns: `grid` (counted from 0 in the image), `kind`, `panel` (`target:panel` with several targets), `row`, `col`, `id`,
 //! `x`, `y` (px, pixel centres at integers, y down), `cov_xx`, `cov_xy`, `cov_yy` (px²), `target` (fingerprint of the target of
-//! the corner). A cell is empty if the value is not known.
+//! the corner), `image` (name of the image), `target_x_mm`, `target_y_mm`, `target_z_mm` (position on the target). A cell is
+//! empty if the value is not known.
 
 use std::fmt::Write;
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
+use super::positions::Positions;
 use deltille_core::detection::Detection;
 use deltille_core::lattice::GridKind;
+use deltille_core::targets::Target;
 
 /// The header line.
-pub const HEADER: &str = "grid,kind,panel,row,col,id,x,y,cov_xx,cov_xy,cov_yy,target";
+pub const HEADER: &str = "grid,kind,panel,row,col,id,x,y,cov_xx,cov_xy,cov_yy,target,image,target_x_mm,target_y_mm,target_z_mm";
 
-/// Returns the text of the CSV file of one image.
+/// Returns the text of the CSV file of one image; `targets` are those that were searched for, if known.
 ///
 /// ```
 /// use deltille_core::detection::Detection;
 /// use deltille_files::export::csv;
 ///
-/// assert_eq!(csv::write(&Detection::default()).lines().next(), Some(csv::HEADER));
+/// assert_eq!(csv::write(&Detection::default(), &[]).lines().next(), Some(csv::HEADER));
 /// ```
-pub fn write(detection: &Detection) -> String {
+pub fn write(detection: &Detection, targets: &[&Target]) -> String {
+    let positions = Positions::of(targets);
+    let image = quoted(&detection.image);
     let mut text = format!("{HEADER}\n");
     for (index, grid) in detection.grids.iter().enumerate() {
         let kind = match grid.kind {
@@ -36,18 +41,32 @@ pub fn write(detection: &Detection) -> String {
         };
         let target = detection.target_of(grid).filter(|_| grid.panel.is_some());
         let target = target.map_or_else(String::new, |target| target.fingerprint.to_string());
+        let positions = positions.of_grid(grid);
         for corner in &grid.corners {
             let (row, col, x, y) = (corner.row, corner.col, corner.x, corner.y);
             let id = corner.id.map_or_else(String::new, |id| id.to_string());
             let cov = corner
                 .cov
                 .map_or_else(|| ",,".to_owned(), |[xx, xy, yy]| format!("{xx},{xy},{yy}"));
+            let position = positions.and_then(|all| all.get(&(row, col)));
+            let position = position
+                .map_or_else(|| ",,".to_owned(), |DVec3 { x, y, z }| format!("{x},{y},{z}"));
             // Writing to a String cannot fail.
-            let _ =
-                writeln!(text, "{index},{kind},{panel},{row},{col},{id},{x},{y},{cov},{target}");
+            let _ = writeln!(
+                text,
+                "{index},{kind},{panel},{row},{col},{id},{x},{y},{cov},{target},{image},{position}"
+            );
         }
     }
     text
+}
+
+/// A text as a cell: in quotes if it contains a separator (RFC 4180).
+fn quoted(text: &str) -> String {
+    match text.contains([',', '"', '\n', '\r']) {
+        true => format!("\"{}\"", text.replace('"', "\"\"")),
+        false => text.to_owned(),
+    }
 }
 
 /// Reads points, px, one `x,y` per line; a header line `x,y` and empty lines are skipped.

@@ -18,8 +18,8 @@ pub struct DetectionFormat {
     pub is_of_one_target: bool,
 }
 
-/// Writer of a detection; the target is the one that was searched for.
-type Text = fn(&Detection, Option<&Target>) -> String;
+/// Writer of a detection; the targets are those that were searched for.
+type Text = fn(&Detection, &[&Target]) -> String;
 
 /// The formats.
 pub const DETECTION_FORMATS: &[DetectionFormat] = &[
@@ -34,14 +34,14 @@ pub const DETECTION_FORMATS: &[DetectionFormat] = &[
         name: "orpc",
         help: "The corner list of the reference detector of Ha et al. (ICCV 2017)",
         kind: || Kind::of(orpc::HEAD.as_bytes()),
-        text: Some(orpc::write),
+        text: Some(|found, targets| orpc::write(found, targets.first().copied())),
         is_of_one_target: true,
     },
     DetectionFormat {
         name: "csv",
-        help: "One corner per line, with a header",
+        help: "One corner per line, with a header, its image and its position on the target",
         kind: || Kind::of(csv::HEADER.as_bytes()),
-        text: Some(|found, _| csv::write(found)),
+        text: Some(csv::write),
         is_of_one_target: false,
     },
     DetectionFormat {
@@ -66,8 +66,8 @@ impl DetectionFormat {
     }
 
     /// Returns the text of an image's file; `None` for tables.
-    pub fn text(&self, found: &Detection, target: Option<&Target>) -> Option<String> {
-        self.text.map(|text| text(found, target))
+    pub fn text(&self, found: &Detection, targets: &[&Target]) -> Option<String> {
+        self.text.map(|text| text(found, targets))
     }
 }
 

@@ -11,6 +11,7 @@ pub mod npy;
 pub mod orpc;
 #[cfg(feature = "overlay")]
 pub mod overlay;
+mod positions;
 #[cfg(feature = "parquet")]
 pub mod tables;
 pub mod tp;

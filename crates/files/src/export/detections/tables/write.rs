@@ -1,11 +1,9 @@
 //! Writer of both tables, a group of rows at a time.
 
-use std::collections::HashMap;
 use std::io::Write;
 use std::mem;
 use std::sync::Arc;
 
-use glam::DVec3;
 use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DoubleType, Int32Type, Int64Type};
 use parquet::errors::ParquetError;
@@ -17,6 +15,7 @@ use parquet::schema::types::{ColumnPath, Type};
 use super::column::{self, Cell, Column, Kind};
 use super::{CORNERS_SCHEMA, IMAGES_SCHEMA, ImageRecord, SCHEMA, TableError};
 use crate::export::GENERATOR;
+use crate::export::detections::positions::Positions;
 use deltille_core::detection::Detection;
 use deltille_core::lattice::GridKind;
 use deltille_core::targets::Target;
@@ -34,13 +33,8 @@ impl From<ParquetError> for TableError {
 pub struct Writer<W: Write + Send> {
     corners: Table<W>,
     images: Table<W>,
-    places: HashMap<Label, DVec3>,
-    /// Whether grids name their targets.
-    are_several: bool,
+    positions: Positions,
 }
-
-/// A corner of a target: the name of the target (with several targets), panel, row and column.
-type Label = (String, u32, i32, i32);
 
 impl<W: Write + Send> Writer<W> {
     /// Begins both tables, of corners and of images. Corners on `targets` are written with their positions on the target.
@@ -48,29 +42,11 @@ impl<W: Write + Send> Writer<W> {
     /// # Errors
     /// Returns an error if the tables cannot be written.
     pub fn new(corners: W, images: W, targets: &[Target]) -> Result<Self, TableError> {
-        let are_several = targets.len() > 1;
-        let places = targets.iter().flat_map(|target| {
-            let name = if are_several { target.name.to_string() } else { String::new() };
-            target.panels.iter().flat_map(move |panel| {
-                let pose = panel.pose.to_pose();
-                let name = name.clone();
-                panel.corners.iter().map(move |corner| {
-                    // Without a measurement, the nominal position is written exactly.
-                    let place = match corner.measured {
-                        None => corner.target_mm,
-                        Some(_) => {
-                            pose.apply(pose.inverse().apply(corner.target_mm) + corner.offset_mm())
-                        }
-                    };
-                    ((name.clone(), panel.id, corner.row, corner.col), place)
-                })
-            })
-        });
+        let targets: Vec<&Target> = targets.iter().collect();
         Ok(Self {
-            places: places.collect(),
+            positions: Positions::of(&targets),
             corners: Table::new(corners, CORNERS_SCHEMA, &column::CORNERS)?,
             images: Table::new(images, IMAGES_SCHEMA, &column::IMAGES)?,
-            are_several,
         })
     }
 
@@ -90,14 +66,11 @@ impl<W: Write + Send> Writer<W> {
         for (index, grid) in found.grids.iter().enumerate() {
             let kind = text(kind_name(grid.kind));
             let target = grid.target.as_deref().map_or(Cell::None, text);
-            let name =
-                grid.target.as_ref().filter(|_| self.are_several).cloned().unwrap_or_default();
-            let mut label = (name, grid.panel.unwrap_or_default(), 0, 0);
+            let positions = self.positions.of_grid(grid);
             for corner in &grid.corners {
-                (label.2, label.3) = (corner.row, corner.col);
-                let place = grid.panel.and_then(|_| self.places.get(&label));
+                let position = positions.and_then(|all| all.get(&(corner.row, corner.col)));
                 let [xx, xy, yy] = three(corner.cov);
-                let [x, y, z] = three(place.map(|place| place.to_array()));
+                let [x, y, z] = three(position.map(|position| position.to_array()));
                 self.corners.push([
                     image.clone(),
                     Cell::Whole(index as i64),
