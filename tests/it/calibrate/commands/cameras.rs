@@ -353,7 +353,7 @@ fn calibrate_refuses_wrong_input() {
         "corners camera.json --target board.json --model radtan",
         "foreign --target board.json --model radtan",
         "corners --target corners/00.json --model radtan",
-        "corners --target board.json --fixed-intrinsics camera.json",
+        "corners --target board.json --fixed-intrinsics corners/00.json",
         "corners --target board.json --fixed-intrinsics known.yaml --shape camera.json",
     ] {
         page.refused(at, &format!("deltille calibrate {args}"));
