@@ -14,9 +14,22 @@ pub fn one_line(message: &impl Display) -> String {
     with_short_quotes(&text).into_owned()
 }
 
-/// Returns the page's name of a setting: `BoardSpec::rows` of the library is `rows`.
+/// Returns the key of a setting in the settings of the page; of one that it does not have, the last part of its path.
 pub fn name(setting: Setting) -> String {
-    setting.path().rsplit("::").next().unwrap_or_default().to_owned()
+    let key = match setting {
+        Setting::AprilGridTagMm | Setting::CharucoSquareMm | Setting::CirclesSpacingMm => "edge_mm",
+        Setting::AprilGridTags | Setting::CharucoSquares | Setting::CirclesCircles => "rows",
+        Setting::BoardTags | Setting::CharucoDictionary => "family",
+        Setting::PaperSize => "paper",
+        Setting::SolidMarginMm => "face_margin_mm",
+        Setting::SolidShapeCuboid => "size",
+        Setting::SolidSheetsPerFace => "per_face",
+        Setting::SolidSheetsSeamedNet => "allow_seams",
+        Setting::TagBorderBits => "tag_border",
+        Setting::TagSpacing => "tag_spacing",
+        _ => setting.path().rsplit("::").next().unwrap_or_default(),
+    };
+    format!("`{key}`")
 }
 
 /// Converts errors to exceptions.
@@ -40,8 +53,20 @@ mod tests {
 
     #[test]
     fn settings_have_the_names_of_the_page() {
-        assert_eq!(name(Setting::BoardRows), "rows");
-        assert_eq!(name(Setting::SolidSquareTagsFirstId), "first_id");
+        let keys = include_str!("../../src/settings.ts");
+        let of_targets = ["AprilGrid", "Board", "Charuco", "Circles", "Paper", "Solid", "Tag"];
+        for setting in Setting::ALL {
+            let path = setting.path();
+            let (kind, _) = path.split_once("Spec::").unwrap_or_default();
+            let key = name(*setting).replace('`', "");
+            // The page has one kind of square tags, and no panels.
+            let is_other = path.contains("square_tags");
+            assert!(
+                !of_targets.contains(&kind) || is_other || keys.contains(&format!("\n  {key}: ")),
+                "{path}: {key}"
+            );
+        }
+        assert_eq!(name(Setting::TagSpacing), "`tag_spacing`");
         let assumed = "another, or set `Detection::assume_targets` to assume this one";
         assert_eq!(one_line(&assumed), "another");
         assert_eq!(one_line(&"unknown paper\nsize `B9`"), "unknown paper size `B9`");
