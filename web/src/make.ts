@@ -51,7 +51,7 @@ export function make(): HTMLElement {
 
   const text = words.make;
   // The build draws the default board.
-  const picture = el("img", { class: "sheet", alt: text.preview, src: import.meta.env.PROD && query(settings) === "" ? "./board.svg" : undefined });
+  const picture = el("img", { class: "sheet", alt: text.preview, src: import.meta.env.PROD && query(settings) === "" ? "./board.svg" : undefined, hidden: true, load: () => (picture.hidden = isTurning) });
   const solid = el("div", { class: "solid" });
   const slider = el("input", { type: "range", min: 0, max: 100, value: 0, input: () => (folded?.unfold(Number(slider.value) / 100), shown()) });
   const play = el("button", { type: "button", click: () => folded?.play(Number(slider.value) < 50 ? 1 : 0, moved) }, text.play.unfold);
