@@ -54,7 +54,7 @@ export function calibrate(): HTMLElement {
   const now = el("button", { type: "button", hidden: true, click: () => (takeNow = true) }, words.calibrate.now);
   let takeNow = false;
   const forget = el("button", { type: "button", hidden: true, click: () => forgetAll() }, words.calibrate.forget);
-  const scale = el("input", { type: "text", inputmode: "decimal", placeholder: words.calibrate.printScaleUsual, input: () => tally() });
+  const scale = el("input", { type: "text", inputmode: "decimal", placeholder: words.calibrate.printScaleUsual, input: () => (scale.setCustomValidity(""), tally()), change: () => checkScale() });
   const empty = el(
     "div",
     { class: "empty" },
@@ -113,18 +113,29 @@ export function calibrate(): HTMLElement {
     problem.hidden = false;
   }
 
+  /** Reports an invalid print scale, and marks its field. */
+  function checkScale(): void {
+    problem.hidden = true;
+    try {
+      printScale(scale.value);
+    } catch (error) {
+      scale.setCustomValidity((error as Error).message);
+      showError(error);
+    }
+  }
+
   async function solve(): Promise<void> {
     problem.hidden = true;
-    tally();
-    if (shots().length === 0) {
-      showError(new Error(words.calibrate.noShots));
-      return;
-    }
-    result.replaceChildren(el("p", { class: "busy" }, words.calibrate.solving));
-    solvedOf = asked();
+    solvedOf = [];
     tally();
     try {
+      result.replaceChildren(el("p", { class: "busy" }, words.calibrate.detecting));
+      for (let known; known !== seen.done; ) await (known = seen.done);
       const all = shots();
+      if (all.length === 0) throw new Error(words.calibrate.noShots);
+      result.replaceChildren(el("p", { class: "busy" }, words.calibrate.solving));
+      solvedOf = asked();
+      tally();
       show(await looking.call("calibrate", target(), all.map(({ json }) => json), all.map(({ name }) => stem(name)), model, printScale(scale.value)));
     } catch (error) {
       solvedOf = [];

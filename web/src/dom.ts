@@ -1,4 +1,6 @@
 // Elements created in one expression.
+import { words } from "./words";
+
 type Attributes = Record<string, string | number | boolean | ((event: Event) => void) | undefined>;
 type Child = Node | string | null | undefined;
 
@@ -32,6 +34,13 @@ export function field(label: string, control: HTMLElement, hint?: string): HTMLE
   const below = hint ? el("small", { id: `${control.id}-hint` }, hint) : null;
   if (below) control.setAttribute("aria-describedby", below.id);
   return el("div", { class: "field" }, el("label", { for: control.id }, label), control, below);
+}
+
+/** The message about an invalid number; the library's own message would not name the form field. */
+export function mistaken(numbers: Iterable<HTMLInputElement>): string | undefined {
+  const wrong = [...numbers].find((control) => !control.validity.valid);
+  // The labels of a control are not known before it is part of the page.
+  return wrong && words.mistaken(wrong.closest(".field")?.querySelector("label")?.textContent ?? "", Number(wrong.min), Number(wrong.max), wrong.step !== "any");
 }
 
 export function select(options: [string, string][], value: string, changed: (value: string) => void): HTMLSelectElement {

@@ -47,9 +47,21 @@ export function families(): HTMLElement {
     const shares = await looking.call("reading", name, RATES);
     if (name !== asked) return;
     figures.replaceChildren(sizes(family.figures), reading(shares, family.figures.correctable));
+    ready();
     // Takes a second or two for large families.
     const rates = await looking.call("falsePositives", name);
     if (name === asked) figures.append(falsePositives(rates, family.figures.kind));
+  }
+
+  /** Shows this part once it is complete, so that nothing visible moves. */
+  function ready(): void {
+    loading.hidden = true;
+    columns.hidden = false;
+  }
+
+  function failed(error: unknown): void {
+    facts.textContent = error instanceof Error && error.message ? error.message : words.failed;
+    ready();
   }
 
   /** One rotation step, degrees. */
@@ -157,20 +169,24 @@ export function families(): HTMLElement {
   looking.call("families").then((all) => {
     const names = all.map(({ name }) => name);
     const first = names.includes(DEFAULT_FAMILY) ? DEFAULT_FAMILY : (names[0] ?? "");
-    chooser.replaceChildren(field(words.families.family, select(names.map((name) => [name, name]), first, (name) => void choose(name))));
+    chooser.replaceChildren(field(words.families.family, select(names.map((name) => [name, name]), first, (name) => void choose(name).catch(failed))));
     return choose(first);
-  }, (error: unknown) => (facts.textContent = error instanceof Error && error.message ? error.message : words.failed));
+  }).catch(failed);
+
+  const loading = el("p", { class: "busy" }, words.loading);
+  const columns = el(
+    "div",
+    { class: "columns", hidden: true },
+    el("div", {}, chooser, field(words.families.id, number), facts, el("div", { class: "buttons" }, el("button", { type: "button", click: () => pick(id) }, words.families.repair), turn), histogram),
+    el("div", { class: "stage" }, tag, verdict, cycles, figures),
+  );
 
   return el(
     "section",
     { class: "families", "aria-label": words.tabs.families },
     el("h2", { class: "title" }, words.families.title),
     el("p", { class: "lead" }, words.families.lead),
-    el(
-      "div",
-      { class: "columns" },
-      el("div", {}, chooser, field(words.families.id, number), facts, el("div", { class: "buttons" }, el("button", { type: "button", click: () => pick(id) }, words.families.repair), turn), histogram),
-      el("div", { class: "stage" }, tag, verdict, cycles, figures),
-    ),
+    loading,
+    columns,
   );
 }

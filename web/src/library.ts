@@ -57,7 +57,7 @@ class Client {
 export const drawing = new Client();
 /** Builds 3D solids, which takes seconds. */
 export const folding = new Client();
-/** Verifies files, which takes seconds. */
+/** Verifies files and counts their pages on A4, which takes seconds that nobody waits for. */
 export const proving = new Client();
 /** Detects targets in images, and calibrates. */
 export const looking = new Client();

@@ -1,6 +1,6 @@
 // Make: settings, a preview of the printed sheet, files, and their verification.
-import { dropZone, el, field, latest, save, select, settled } from "./dom";
-import { LibraryError, drawing, folding } from "./library";
+import { dropZone, el, field, latest, mistaken, save, select, settled } from "./dom";
+import { LibraryError, drawing, folding, proving } from "./library";
 import { type Format, proof } from "./proof";
 import { type Settings, PLACES, applies, asked, hasFiles, isBoard, isKind, isSolid, ofTemplate, query, read, settled as settingsOf, template } from "./settings";
 import { made } from "./shared";
@@ -35,14 +35,21 @@ const types: Record<string, string> = { pdf: "application/pdf", svg: "image/svg+
 const A4_MM = [210, 297];
 /** Time without a change before slow figures are computed, ms. */
 const IDLE_MS = 500;
+/** Time after which an earlier preview is marked as past, ms. */
+const LATE_MS = 300;
+/** Files with settings or parts of a target. */
+const ACCEPTED = ".toml,.json,.obj,.stl,.glb,.svg";
 
 export function make(): HTMLElement {
-  let settings: Settings = read(location.hash.split("?")[1] ?? "");
+  const first = read(location.hash.split("?")[1] ?? "");
+  let settings = first.settings;
   /** The address as last read or written. */
   let addressed = location.hash;
   let pages: Pages | null = null;
   let at = 0;
   let isFirstDrawing = true;
+  /** Whether the build has drawn these settings. */
+  const isBuilt = () => isFirstDrawing && query(settings) === "";
   let isTurning = false;
   let folded: Folding | null = null;
   /** The settings of the solid shown. */
@@ -51,7 +58,7 @@ export function make(): HTMLElement {
 
   const text = words.make;
   // The build draws the default board.
-  const picture = el("img", { class: "sheet", alt: text.preview, src: import.meta.env.PROD && query(settings) === "" ? "./board.svg" : undefined });
+  const picture = el("img", { class: "sheet", alt: text.preview, src: import.meta.env.PROD && isBuilt() ? "./board.svg" : undefined, hidden: true, load: () => (picture.hidden = isTurning) });
   const solid = el("div", { class: "solid" });
   const slider = el("input", { type: "range", min: 0, max: 100, value: 0, input: () => (folded?.unfold(Number(slider.value) / 100), shown()) });
   const play = el("button", { type: "button", click: () => folded?.play(Number(slider.value) < 50 ? 1 : 0, moved) }, text.play.unfold);
@@ -59,6 +66,7 @@ export function make(): HTMLElement {
   const making = el("p", { class: "busy", hidden: true }, text.making);
   const space = el("div", { hidden: true }, solid, fold, making);
   const problem = el("p", { class: "problem", role: "alert", hidden: true });
+  const notice = el("p", { class: "problem", role: "alert", hidden: true });
   const printing = el("p", { class: "hint" }, text.printing);
   const sheets = el("p", { class: "sheets", "aria-live": "polite" });
   const facts = el("p", { class: "facts", "aria-live": "polite" });
@@ -70,7 +78,7 @@ export function make(): HTMLElement {
   const more = el("details", { class: "more", toggle: () => more.open && restart() }, el("summary", {}, text.formats), others);
   const verification = proof(() => [PDF, ...(more.open ? formats().filter(([format]) => !NOT_PROVED.includes(format)) : [])]);
   more.append(verification.lines);
-  const chooser = el("input", { type: "file", accept: ".toml,.json,.obj,.stl,.glb,.svg", hidden: true, change: () => void load([...(chooser.files ?? [])]) });
+  const chooser = el("input", { type: "file", accept: ACCEPTED, hidden: true, change: () => void load([...(chooser.files ?? [])], chooser.accept) });
   const choose = (accept: string) => {
     chooser.accept = accept;
     chooser.click();
@@ -83,13 +91,23 @@ export function make(): HTMLElement {
 
   function changed(change: Partial<Settings>, isForm = false): void {
     settings = { ...settings, ...change };
+    notice.hidden = true;
     if (isForm) fill();
+    draw();
+  }
+
+  /** Shows other settings, and names those that are ignored. */
+  function take(given: Settings, ignored: string[] = []): void {
+    settings = given;
+    notice.textContent = text.ignored(ignored);
+    notice.hidden = ignored.length === 0;
+    fill();
     draw();
   }
 
   function fill(): void {
     fillForm(settings, known);
-    others.replaceChildren(...formats().flatMap(([format, label]) => [el("dt", {}, el("button", { type: "button", click: () => void download(format) }, label)), el("dd", {}, text.about[format])]));
+    others.replaceChildren(...formats().flatMap(([format, label]) => [el("dt", {}, el("button", { type: "button", disabled: pages === null, click: () => void download(format) }, label)), el("dd", {}, text.about[format])]));
     const ofSolid = isSolid(settings);
     views.replaceChildren(
       ...(ofSolid ? [false, true].map((isOn) => el("button", { type: "button", "aria-pressed": String(isOn === isTurning), click: () => turn(isOn) }, isOn ? text.view.solid : text.view.sheet)) : []),
@@ -112,11 +130,13 @@ export function make(): HTMLElement {
     const of = asked(settings);
     if (of === foldedOf) return folded?.fit();
     making.hidden = false;
+    solid.classList.add("past");
     try {
       const [{ showMesh }, { glb, hinges }] = await Promise.all([import("./solid"), folding.call("solid", of)]);
       if (of !== asked(settings)) return;
       folded?.end();
       folded = await showMesh(solid, glb, hinges, text.solidView);
+      solid.classList.remove("past");
       // The first time, the net folds into the solid.
       const isFirst = foldedOf === "" && hinges.length > 0;
       foldedOf = of;
@@ -147,20 +167,22 @@ export function make(): HTMLElement {
     problem.hidden = false;
   }
 
-  /** The message about an invalid number; the library's own message would not name the form field. */
-  function mistaken(numbers: Iterable<HTMLInputElement>): string | undefined {
-    const wrong = [...numbers].find((control) => !control.validity.valid);
-    const details = wrong?.closest("details");
-    if (details) details.open = true;
-    return wrong && text.mistaken(wrong.labels?.[0]?.textContent ?? "", Number(wrong.min), Number(wrong.max), wrong.step !== "any");
-  }
-
   const redraw = latest(async (isStale) => {
     const of = asked(settings);
     address();
+    const late = setTimeout(() => {
+      // The board drawn by the build is not past.
+      if (isBuilt()) return;
+      show(null);
+      problem.hidden = true;
+      sheets.replaceChildren(el("span", { class: "busy" }, text.drawing));
+    }, LATE_MS);
     try {
       const mistake = mistaken(form.querySelectorAll<HTMLInputElement>("input[type=number]"));
-      if (mistake) throw new LibraryError(mistake);
+      if (mistake) {
+        form.querySelector("details:has(:invalid)")?.toggleAttribute("open", true);
+        throw new LibraryError(mistake);
+      }
       show(await drawing.call("draw", of));
       if (isTurning && !isStale()) void showSolid();
       if (!isStale()) restart();
@@ -168,6 +190,8 @@ export function make(): HTMLElement {
       if (isStale()) return;
       show(null);
       showError(error);
+    } finally {
+      clearTimeout(late);
     }
   });
 
@@ -184,7 +208,7 @@ export function make(): HTMLElement {
   /** Shows the sheet that was drawn, or null after an error. */
   function show(drawn: Pages | null): void {
     pages = drawn;
-    picture.classList.toggle("past", !drawn);
+    for (const part of [picture, solid]) part.classList.toggle("past", !drawn);
     for (const button of [pdf, ...others.querySelectorAll("button")]) button.disabled = !drawn;
     if (!drawn) {
       for (const part of [sheets, facts, range]) part.textContent = "";
@@ -194,7 +218,7 @@ export function make(): HTMLElement {
     made.name = settings.name;
     made.family = applies("family_file", settings) ? settings.family_file : null;
     problem.hidden = true;
-    turnTo(Math.min(at, drawn.pages.length - 1), isFirstDrawing && query(settings) === "");
+    turnTo(Math.min(at, drawn.pages.length - 1), isBuilt());
     isFirstDrawing = false;
     showFacts(drawn);
     // Do not rebuild the form: the user may be typing in it.
@@ -255,7 +279,7 @@ export function make(): HTMLElement {
   /** Laying out the net of an icosahedron on small paper takes a second. */
   const showA4 = settled(async (drawn: Pages, said: string, use: HTMLElement) => {
     if (drawn !== pages) return;
-    const count = await folding.call("pagesOnA4", asked(settings)).catch(() => null);
+    const count = await proving.call("pagesOnA4", asked(settings)).catch(() => null);
     if (drawn === pages && count !== null) sheets.replaceChildren(`${said}${text.fitsOnA4(count)}. `, use);
   }, IDLE_MS);
 
@@ -283,11 +307,13 @@ export function make(): HTMLElement {
     }
   }
 
-  async function load(files: File[]): Promise<void> {
+  async function load(files: File[], accepted = ACCEPTED): Promise<void> {
     chooser.value = "";
     const [file] = files;
     if (!file) return;
     try {
+      const endings = accepted.split(",");
+      if (!endings.some((ending) => file.name.toLowerCase().endsWith(ending))) throw new Error(text.notAccepted(endings));
       if (/\.(obj|stl|glb)$/i.test(file.name)) {
         const { inObj } = await import("./meshes");
         const mesh = await inObj(file.name, new Uint8Array(await file.arrayBuffer()));
@@ -297,10 +323,7 @@ export function make(): HTMLElement {
       }
       const content = await file.text();
       if (/\.svg$/i.test(file.name)) return changed({ logo: await folding.call("logo", content) }, true);
-      const read = /\.toml$/i.test(file.name) ? ofTemplate(content) : ofValues(content, file.name);
-      settings = read;
-      fill();
-      draw();
+      take(/\.toml$/i.test(file.name) ? ofTemplate(content) : ofValues(content, file.name));
     } catch (error) {
       showError(new LibraryError(`${file.name}: ${error instanceof SyntaxError || !(error instanceof Error) ? text.noSettings : error.message}`));
     }
@@ -343,10 +366,7 @@ export function make(): HTMLElement {
   const pixels = el("input", { type: "number", min: 64, max: 20_000, value: 1920, required: true, input: () => void showRange() });
   const offered = select([["", text.noTemplate], ...templates.map(({ name }) => [name, name] as [string, string])], "", (name) => {
     const chosen = templates.find((template) => template.name === name);
-    if (!chosen) return;
-    settings = ofTemplate(chosen.text);
-    fill();
-    draw();
+    if (chosen) take(ofTemplate(chosen.text));
   });
   // A link to other settings, followed while the page is open.
   window.addEventListener("hashchange", () => {
@@ -358,12 +378,10 @@ export function make(): HTMLElement {
       address();
       return;
     }
-    settings = read(of);
-    fill();
-    draw();
+    const given = read(of);
+    take(given.settings, given.ignored);
   });
-  fill();
-  draw();
+  take(first.settings, first.ignored);
   Promise.all([drawing.call("families"), drawing.call("dictionaries")]).then(([families, dictionaries]) => {
     known = { families, dictionaries };
     fill();
@@ -387,13 +405,13 @@ export function make(): HTMLElement {
           { class: "rest" },
           el("fieldset", {}, el("legend", {}, text.camera), field(text.fieldOfView, view), field(text.pixels, pixels)),
           field(text.templates, offered),
-          dropZone((files) => void load(files), el("p", {}, text.drop), el("div", { class: "buttons" }, el("button", { type: "button", click: () => choose(".toml,.json,.obj,.stl,.glb,.svg") }, text.load)), chooser),
+          dropZone((files) => void load(files), el("p", {}, text.drop), el("div", { class: "buttons" }, el("button", { type: "button", click: () => choose(ACCEPTED) }, text.load)), chooser),
         ),
       ),
       el(
         "div",
         {},
-        el("div", { class: "stage" }, problem, views, el("div", { class: "board" }, picture, space), pager, sheets, facts, range, el("p", { class: "printed" }, text.printed)),
+        el("div", { class: "stage" }, notice, problem, views, el("div", { class: "board" }, picture, space), pager, sheets, facts, range, el("p", { class: "printed" }, text.printed)),
         el(
           "div",
           { class: "get" },

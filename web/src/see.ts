@@ -1,5 +1,5 @@
 // Detect: dropped photographs, and the targets found in them.
-import { dropZone, el, field, save, select } from "./dom";
+import { dropZone, el, field, mistaken, save, select } from "./dom";
 import { LibraryError, drawing, looking } from "./library";
 import { type Sample, samples } from "./samples";
 import { asked, usual } from "./settings";
@@ -111,18 +111,23 @@ export function see(): HTMLElement {
   const list = el("ul", { class: "photos" });
   const inked = el("p", { class: "facts", "aria-live": "polite" });
   const downloads = el("div", { class: "buttons" });
-  const chooser = el("input", { type: "file", multiple: true, hidden: true, accept: ".jpg,.jpeg,.png,.tif,.tiff,.webp,.bmp,.pgm,.ppm,.json", change: () => void take([...(chooser.files ?? [])]) });
+  const chooser = el("input", { type: "file", multiple: true, hidden: true, accept: ".jpg,.jpeg,.png,.tif,.tiff,.webp,.bmp,.pgm,.ppm,.json", change: () => begin(take([...(chooser.files ?? [])])) });
   const zone = dropZone(
-    (files) => void take(files),
+    (files) => begin(take(files)),
     el("p", {}, words.see.drop),
     el("div", { class: "buttons" }, el("button", { type: "button", class: "first", click: () => chooser.click() }, words.see.choose)),
-    el("div", { class: "buttons quiet" }, ...samples.map((sample) => el("button", { type: "button", click: () => void sampled(sample) }, sample.label))),
+    el("div", { class: "buttons quiet" }, ...samples.map((sample) => el("button", { type: "button", click: () => begin(sampled(sample)) }, sample.label))),
     chooser,
   );
   const options = el("div", {});
   const known = el("div", { "aria-live": "polite" });
   let described: { name: string; json: string } | null = null;
   let isMoreOpen = false;
+
+  /** Runs detection, whose end calibration awaits. */
+  function begin(work: Promise<void>): void {
+    seen.done = Promise.allSettled([seen.done, work]);
+  }
 
   function choose(value: string): void {
     choice = value;
@@ -132,16 +137,16 @@ export function see(): HTMLElement {
     else if (value === "made") sought = { target: made.json, family: made.family };
     else if (value === "described" && described) sought = { target: described.json };
     else sought = { grid: value };
-    again();
+    begin(again());
   }
 
   /** Repeats detection in all photographs. */
-  function again(): void {
+  function again(): Promise<void> {
     for (const photo of photos) {
       photo.result = photo.found = null;
       photo.error = "";
     }
-    void look();
+    return look();
   }
 
   /** Shows the available targets and the current choice. */
@@ -264,7 +269,7 @@ export function see(): HTMLElement {
       if (photo === photos[at]) draw();
     }
     if (turn !== asking) return;
-    inked.textContent = ink ? words.see.inked(ink.words, alike.length) : "";
+    inked.textContent = ink ? words.see.inked(ink.words, (JSON.parse(ink.estimate) as { images: number }).images) : "";
     fill();
   }
 
@@ -275,7 +280,7 @@ export function see(): HTMLElement {
       known.replaceChildren(el("p", { class: "good" }, words.see.recognisedSolid(String((found.spec as { shape?: unknown }).shape ?? ""), found.tags)));
       return;
     }
-    const edge = el("input", { type: "number", min: 0.1, max: 1000, step: "any", value: spec.edge_mm, change: () => void resize(spec, Number(edge.value)) });
+    const edge = el("input", { type: "number", min: 0.1, max: 1000, step: "any", required: true, value: spec.edge_mm, change: () => begin(resize(spec, edge)) });
     known.replaceChildren(
       el("p", { class: "good" }, words.see.recognised(spec.grid ?? "deltille", spec.rows, spec.cols, spec.tags.family, spec.tags.first_id)),
       el("p", { class: "facts" }, words.see.recognisedBy(found.tags, found.shown, found.corners)),
@@ -283,14 +288,18 @@ export function see(): HTMLElement {
     );
   }
 
-  async function resize(spec: BoardSpec, edge_mm: number): Promise<void> {
-    if (!(edge_mm > 0)) return;
+  async function resize(spec: BoardSpec, edge: HTMLInputElement): Promise<void> {
+    const mistake = mistaken([edge]);
+    problem.hidden = mistake === undefined;
+    problem.textContent = mistake ?? "";
+    if (mistake) return;
+    const edge_mm = Number(edge.value);
     const { family, first_id, spacing, border_bits, tags_in } = spec.tags;
     const { rows, cols, inverted, grid = "deltille" } = spec;
     try {
       const settings = { ...usual, kind: grid, rows, cols, edge_mm, inverted, family, first_id, tag_spacing: spacing, tag_border: border_bits, tags_in: tags_in ?? "black" };
       sought = { target: (await drawing.call("draw", asked(settings))).json };
-      again();
+      await again();
     } catch (error) {
       showError(error);
     }
@@ -366,7 +375,7 @@ export function see(): HTMLElement {
     photos.splice(at, 1);
     at = Math.min(at, photos.length - 1);
     draw();
-    void look();
+    begin(look());
   }
 
   function clear(): void {

@@ -178,29 +178,31 @@ export function ofKind(kind: string, settings: Settings): Settings {
 export function query(settings: Settings): string {
   if (settings.kind === "mesh") return "";
   const without: Settings = { ...usualOf(settings.kind), kind: usual.kind };
-  const pairs = Object.entries(settings).filter(([key, value]) => value !== without[key as keyof Settings] && !(LONG as readonly string[]).includes(key));
+  const pairs = Object.entries(settings).filter(([key, value]) => value !== null && value !== without[key as keyof Settings] && !(LONG as readonly string[]).includes(key));
   return new URLSearchParams(pairs.map(([key, value]) => [key, String(value)])).toString();
 }
 
-/** Settings from named values; missing and invalid ones keep their defaults. */
-export function settled(values: Iterable<[string, string]>): Settings {
+/** Settings from named values; missing and invalid ones keep their defaults, and `ignored` names unknown and invalid ones. */
+export function settled(values: Iterable<[string, string]>, ignored: string[] = []): Settings {
   const all = new Map(values);
   const kind = all.get("kind") ?? "";
   const found: Record<string, unknown> = { ...usualOf(isKind(kind) ? kind : usual.kind) };
   for (const [key, value] of all) {
-    if (!(key in usual)) continue;
-    const before = usual[key as keyof Settings];
-    if (typeof before === "boolean") found[key] = value === "true";
-    else if (NUMBERS.includes(key)) found[key] = value !== "" && Number.isFinite(Number(value)) ? Number(value) : before;
-    else if (!CHOICES[key] || CHOICES[key].includes(value)) found[key] = value;
+    const isNumber = NUMBERS.includes(key);
+    const isBoolean = typeof usual[key as keyof Settings] === "boolean";
+    const choices = isBoolean ? ["true", "false"] : CHOICES[key];
+    const isValid = Object.hasOwn(usual, key) && (isNumber ? value !== "" && Number.isFinite(Number(value)) : (choices?.includes(value) ?? true));
+    if (!isValid) ignored.push(`${key}=${value}`);
+    else found[key] = isNumber ? Number(value) : isBoolean ? value === "true" : value;
   }
   return found as Settings;
 }
 
-/** The settings of an address, which cannot contain a mesh. */
-export function read(text: string): Settings {
-  const found = settled(new URLSearchParams(text));
-  return found.kind === "mesh" ? usual : found;
+/** The settings of an address, and those that are ignored; an address cannot contain a mesh. */
+export function read(text: string): { settings: Settings; ignored: string[] } {
+  const ignored: string[] = [];
+  const settings = settled(new URLSearchParams(text), ignored);
+  return settings.kind === "mesh" ? { settings: usual, ignored: text.split("&") } : { settings, ignored };
 }
 
 export const isKind = (kind: unknown): boolean => KINDS.includes(String(kind));

@@ -7,8 +7,8 @@ export const made: { json: string; name: string; family: string | null; isWanted
 /** A processed photograph. */
 export type Shot = { name: string; json: string; corners: number; labelled: boolean };
 
-/** The target searched for, and the processed photographs. */
-export const seen: { sought: Sought | null; shots: Shot[] } = { sought: null, shots: [] };
+/** The target searched for, the processed photographs, and the end of all detection requested so far. */
+export const seen: { sought: Sought | null; shots: Shot[]; done: Promise<unknown> } = { sought: null, shots: [], done: Promise.resolve() };
 
 /** The name of a file without its extension, used as the name of its view. */
 export const stem = (name: string) => name.replace(/\.[^.]*$/, "");

@@ -198,6 +198,14 @@ test.describe("make", () => {
     await page.getByLabel("Paper width, mm").fill("700");
     await page.getByLabel("Paper height, mm").fill("500");
     await expect(said).toContainText("landscape, 700 × 500 mm, edge 40 mm");
+    // A large board takes a while; what belongs to the one before is gone.
+    await page.goto("/#make?rows=400&cols=400&edge_mm=10");
+    await expect(said).toHaveText("Drawing the target…");
+    await expect(page.locator("img.past")).toBeVisible();
+    await expect(page.getByRole("button", { name: "Download PDF", exact: true })).toBeDisabled();
+    await expect(page.getByText("160000 corners")).toBeVisible({ timeout: 60_000 });
+    await expect(page.locator("img.past")).toBeHidden();
+    await expect(page.getByRole("button", { name: "Download PDF", exact: true })).toBeEnabled();
   });
 
   test("all targets and options of the program are on the page", async ({ page }) => {
@@ -293,12 +301,18 @@ test.describe("make", () => {
   });
 
   test("invalid settings in an address fall back to defaults, and the address follows the settings", async ({ page }) => {
-    for (const nonsense of ["kind=foo&orientation=upside&tags_in=purple", "kind=mesh&name=part", "rows=many"]) {
+    for (const nonsense of ["kind=foo&orientation=upside&tags_in=purple", "kind=mesh&name=part", "rows=many&colour=red"]) {
       await page.goto("about:blank");
       await page.goto(`/#make?${nonsense}`);
       await expect(page.getByText("110 corners")).toBeVisible({ timeout: 30_000 });
-      await expect(page.getByRole("alert")).toBeHidden();
+      await expect(page.getByRole("alert")).toHaveText(`The address contains unknown settings or invalid values, which are ignored: ${nonsense.replaceAll("&", ", ")}; set them in the form instead.`);
     }
+    await page.getByLabel("Rows of corners").fill("9");
+    await expect(page.getByRole("alert")).toBeHidden();
+    await page.goto("about:blank");
+    await page.goto("/#make?first_id=-1");
+    await expect(page.getByRole("alert")).toHaveText("First tag id: enter a whole number from 0 to 4294967295.");
+    await expect(page.getByLabel("First tag id")).toBeVisible();
     await page.goto("about:blank");
     await page.goto("/#make?kind=icosahedron&paper=900x1300mm");
     await expect(page.getByText("720 corners")).toBeVisible({ timeout: 30_000 });
@@ -319,6 +333,8 @@ test.describe("make", () => {
     expect(page.url()).not.toContain("mesh");
     await drop(page, [{ name: "other.json", content: Buffer.from('{"kind": "other"}') }]);
     await expect(page.getByRole("alert")).toHaveText("other.json: not a settings file");
+    await drop(page, [{ name: "logo.png", content: Buffer.from("no logo") }]);
+    await expect(page.getByRole("alert")).toHaveText("logo.png: choose a file of type .toml, .json, .obj, .stl, .glb, .svg");
     await drop(page, [{ name: "board.json", content: content("board.json") }]);
     await expect(page.getByRole("alert")).toContainText("board.json: this is the description of a finished target");
   });
@@ -417,8 +433,12 @@ test.describe("see", () => {
     await page.getByRole("button", { name: "Use the rendered sample board" }).click();
     await expect(page.getByText("Identified: a deltille board of 9 × 12 corners with delTag25h7 tags, starting at id 0.")).toBeVisible({ timeout: 60_000 });
     await expect(page.getByRole("button", { name: /board\.png 108 corners, 12 tags/ })).toBeVisible({ timeout: 30_000 });
+    await page.getByLabel("Tile edge, mm").fill("0");
+    await page.keyboard.press("Tab");
+    await expect(page.getByRole("alert")).toHaveText("Tile edge, mm: enter a number from 0.1 to 1000.");
     await page.getByLabel("Tile edge, mm").fill("24.5");
     await page.keyboard.press("Tab");
+    await expect(page.getByRole("alert")).toBeHidden();
     await expect(page.getByRole("button", { name: /board\.png 108 corners, 12 tags/ })).toBeVisible({ timeout: 30_000 });
     await screen(page, "see-recognised");
     await page.getByRole("button", { name: "Remove all" }).click();
@@ -491,8 +511,11 @@ test.describe("calibrate", () => {
     await page.goto("/#see");
     const shots = Array.from({ length: 10 }, (_, i) => join(folder, `${i}.png`));
     await chooseFiles(page, [join(folder, "board.json"), ...shots]);
-    await expect(page.getByRole("button", { name: /9\.png \d+ corners/ })).toBeVisible({ timeout: 60_000 });
     await page.getByRole("link", { name: "Calibrate", exact: true }).click();
+    // Calibration waits for the detection in all of them.
+    await page.getByRole("button", { name: "Calibrate", exact: true }).click();
+    await expect(page.getByText("Waiting for the detection in the photographs…")).toBeVisible();
+    await expect(page.getByText(/Reprojection error: 0\.0\d+ px RMS per axis over 10 views/)).toBeVisible({ timeout: 60_000 });
     await expect(page.getByText("10 images with labelled corners")).toBeVisible();
     const covered = page.getByText(/10 images; \d+ % of the image area covered; tilts from \d+° to \d+°/);
     await expect(covered).toBeVisible({ timeout: 30_000 });
@@ -517,7 +540,7 @@ test.describe("calibrate", () => {
     }
     // The print scale of the page may be a quotient.
     await page.getByLabel("Print scale").fill("269.3/270, 3");
-    await page.getByRole("button", { name: "Calibrate", exact: true }).click();
+    await page.keyboard.press("Tab");
     await expect(page.getByRole("alert")).toContainText("Print scale: 269.3/270, 3 is not a ratio from 0.5 to 2");
     await page.getByLabel("Print scale").fill("269.325/270, 0.9985");
     await page.getByRole("button", { name: "Calibrate", exact: true }).click();
