@@ -163,8 +163,16 @@ export function make(): HTMLElement {
 
   function showError(error: unknown): void {
     const message = error instanceof Error ? error.message : String(error);
-    problem.textContent = message || words.failed;
+    problem.textContent = labelled(message) || words.failed;
     problem.hidden = false;
+  }
+
+  /** A message of the library with the labels of fields instead of the keys of settings. */
+  function labelled(message: string): string {
+    return message.replace(/`(\w+)`/g, (key, name: string) => {
+      const label = form.querySelector<HTMLInputElement>(`[name="${name}"]`)?.labels?.[0]?.textContent;
+      return label ? `“${label.replace(/, mm$/, "")}”` : key;
+    });
   }
 
   const redraw = latest(async (isStale) => {

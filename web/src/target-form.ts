@@ -49,6 +49,7 @@ export function targetForm({ changed: report, chooseMesh, chooseLogo }: Given): 
   function number(label: string, key: keyof Settings, least: number, most: number, usual?: string, hint?: string): HTMLElement {
     const control = el("input", {
       type: "number",
+      name: key,
       min: least,
       max: most,
       step: /_mm$|border|gap/.test(key) ? "any" : 1,
@@ -61,7 +62,7 @@ export function targetForm({ changed: report, chooseMesh, chooseLogo }: Given): 
   }
 
   function box(label: string, key: keyof Settings): HTMLElement {
-    const control = el("input", { type: "checkbox", change: () => changed({ [key]: control.checked } as Partial<Settings>) });
+    const control = el("input", { type: "checkbox", name: key, change: () => changed({ [key]: control.checked } as Partial<Settings>) });
     control.checked = settings[key] as boolean;
     const whole = field(label, control);
     whole.classList.add("box");
@@ -69,7 +70,7 @@ export function targetForm({ changed: report, chooseMesh, chooseLogo }: Given): 
   }
 
   function line(label: string, key: keyof Settings, usual?: string): HTMLElement {
-    const control = el("input", { type: "text", value: (settings[key] as string | null) ?? "", placeholder: usual, input: () => changed({ [key]: control.value || null } as Partial<Settings>) });
+    const control = el("input", { type: "text", name: key, value: (settings[key] as string | null) ?? "", placeholder: usual, input: () => changed({ [key]: control.value || null } as Partial<Settings>) });
     return field(label, control);
   }
 
@@ -104,6 +105,7 @@ export function targetForm({ changed: report, chooseMesh, chooseLogo }: Given): 
       const family_file = name === settings.family ? settings.family_file : null;
       changed(name === PLACES ? { family: name, family_file, tag_spacing: null, first_id: 0 } : { family: name, family_file }, true);
     });
+    familyChoice.name = "family";
     return [field(kind === "charuco" ? text.dictionary : text.family, familyChoice)];
   }
 
@@ -113,6 +115,7 @@ export function targetForm({ changed: report, chooseMesh, chooseLogo }: Given): 
     const other = isOther ? paper : text.otherPaper;
     const options: [string, string][] = [["", text.smallest], ...papers.map((paper): [string, string] => [paper, paper]), [other, other]];
     const choice = select(options, paper ?? "", (paper) => changed({ paper: paper === text.otherPaper ? "400x300mm" : paper || null }, true));
+    choice.name = "paper";
     const [, width, height] = /^([\d.]+) ?[x×] ?([\d.]+) ?mm$/.exec(paper ?? "") ?? [];
     const pages = isSolid(settings) && !settings.per_face ? [number(text.pages, "pages", 1, 500, text.usual)] : [];
     if (!isOther || width === undefined) return [field(text.paper, choice), ...pages];
