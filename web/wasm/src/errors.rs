@@ -14,9 +14,16 @@ pub fn one_line(message: &impl Display) -> String {
     with_short_quotes(&text).into_owned()
 }
 
-/// Returns the key of a setting in the settings of the page; of one that it does not have, the last part of its path.
+/// Returns the key of a setting in the settings of the page, or its words; of one that the page does not have, the option of
+/// the program or the last part of its path.
 pub fn name(setting: Setting) -> String {
     let key = match setting {
+        Setting::CalibrateModel => return "the camera model".to_owned(),
+        Setting::CalibrationBoardShape => return "`deltille calibrate --board-shape`".to_owned(),
+        Setting::CalibrationMeasureTarget => {
+            return "`deltille calibrate --measure-target`".to_owned();
+        }
+        Setting::PrintScale => return "the print scale".to_owned(),
         Setting::AprilGridTagMm | Setting::CharucoSquareMm | Setting::CirclesSpacingMm => "edge_mm",
         Setting::AprilGridTags | Setting::CharucoSquares | Setting::CirclesCircles => "rows",
         Setting::BoardTags | Setting::CharucoDictionary => "family",

@@ -90,7 +90,7 @@ impl Solved {
             json,
             opencv: camera::opencv(&found.camera).ok(),
             ros: camera::ros(&found.camera, "camera").ok(),
-            said: page.warnings().iter().map(one_line).collect(),
+            said: page.remedies().iter().map(one_line).collect(),
             page: page.html(),
             figures: figures.to_string(),
         })
@@ -121,7 +121,7 @@ impl Solved {
         self.page.clone()
     }
 
-    /// Returns what makes the figures unreliable, in sentences.
+    /// Returns what to improve, in sentences, the most important first.
     pub fn said(&self) -> Vec<String> {
         self.said.clone()
     }

@@ -138,11 +138,11 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
 }
 
 impl Report<'_> {
-    /// Returns what makes the figures unreliable, with remedies: the warnings of the page.
-    pub fn warnings(&self) -> Vec<String> {
+    /// Returns what to improve, the most important first: the warnings and hints of the page.
+    pub fn remedies(&self) -> Vec<String> {
         let surveys: Vec<Survey> = self.estimate.cameras.iter().map(Survey::new).collect();
         let all = advice(self, &surveys).into_iter();
-        all.filter(|piece| piece.weight == Weight::Warning).map(|piece| piece.text).collect()
+        all.filter(|piece| piece.weight != Weight::Good).map(|piece| piece.text).collect()
     }
 }
 
