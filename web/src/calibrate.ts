@@ -130,6 +130,7 @@ export function calibrate(): HTMLElement {
     tally();
     try {
       result.replaceChildren(el("p", { class: "busy" }, words.calibrate.detecting));
+      result.scrollIntoView({ block: "nearest" });
       for (let known; known !== seen.done; ) await (known = seen.done);
       const all = shots();
       if (all.length === 0) throw new Error(words.calibrate.noShots);

@@ -280,19 +280,20 @@ export function see(): HTMLElement {
       known.replaceChildren(el("p", { class: "good" }, words.see.recognisedSolid(String((found.spec as { shape?: unknown }).shape ?? ""), found.tags)));
       return;
     }
-    const edge = el("input", { type: "number", min: 0.1, max: 1000, step: "any", required: true, value: spec.edge_mm, change: () => begin(resize(spec, edge)) });
+    const edge = el("input", { type: "number", min: 0.1, max: 1000, step: "any", required: true, value: spec.edge_mm, change: () => begin(resize(spec, edge, wrong)) });
+    const wrong = el("p", { class: "problem", role: "alert", hidden: true });
     known.replaceChildren(
       el("p", { class: "good" }, words.see.recognised(spec.grid ?? "deltille", spec.rows, spec.cols, spec.tags.family, spec.tags.first_id)),
       el("p", { class: "facts" }, words.see.recognisedBy(found.tags, found.shown, found.corners)),
       field(words.see.edge, edge, words.see.edgeHint),
+      wrong,
     );
   }
 
-  async function resize(spec: BoardSpec, edge: HTMLInputElement): Promise<void> {
-    const mistake = mistaken([edge]);
-    problem.hidden = mistake === undefined;
-    problem.textContent = mistake ?? "";
-    if (mistake) return;
+  async function resize(spec: BoardSpec, edge: HTMLInputElement, wrong: HTMLElement): Promise<void> {
+    wrong.textContent = mistaken([edge]) ?? "";
+    wrong.hidden = edge.validity.valid;
+    if (!edge.validity.valid) return;
     const edge_mm = Number(edge.value);
     const { family, first_id, spacing, border_bits, tags_in } = spec.tags;
     const { rows, cols, inverted, grid = "deltille" } = spec;
