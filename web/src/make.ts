@@ -64,7 +64,7 @@ export function make(): HTMLElement {
   const play = el("button", { type: "button", click: () => folded?.play(Number(slider.value) < 50 ? 1 : 0, moved) }, text.play.unfold);
   const fold = el("div", { class: "fold", hidden: true }, field(text.unfold, slider), play);
   const making = el("p", { class: "busy", hidden: true }, text.making);
-  const space = el("div", { hidden: true }, solid, fold, making);
+  const space = el("div", { hidden: true }, making, solid, fold);
   const problem = el("p", { class: "problem", role: "alert", hidden: true });
   const notice = el("p", { class: "problem", role: "alert", hidden: true });
   const printing = el("p", { class: "hint" }, text.printing);
