@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         for reason in &found.reasons {
             println!("    {reason}");
         }
-        std::fs::write(path.with_extension("csv"), csv::write(&found))?;
+        std::fs::write(path.with_extension("csv"), csv::write(&found, &[&target]))?;
     }
     Ok(())
 }
