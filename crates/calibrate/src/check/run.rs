@@ -4,7 +4,7 @@ use super::answer::{Answer, Check, Missing, Quantity, QuantityTest, Suspect};
 use super::earlier::Earlier;
 use super::equations::Equations;
 use super::hypotheses::Evidence;
-use super::views::Views;
+use super::views::{LOOSE, TIGHT, Views};
 use crate::estimate::values::Estimate;
 use crate::input::calibration::Calibration;
 
@@ -57,11 +57,22 @@ impl Calibration {
         if !changed.is_empty() {
             return Check { answer: Answer::Changed, changed, ..check };
         }
-        let earlier = Earlier::of(before);
-        match earlier.and_then(|earlier| Ok((Views::of(self, &earlier)?, earlier))) {
-            Ok((views, earlier)) => answer(&views, &earlier, self.board_accuracy_mm, check),
-            Err(missing) => Check { missing: vec![missing], ..check },
-        }
+        let found = Earlier::of(before).and_then(|earlier| {
+            let of = |width| {
+                let views = Views::of(self, &earlier, width)?;
+                Ok(answer(&views, &earlier, self.board_accuracy_mm, check.clone()))
+            };
+            let found = of(LOOSE)?;
+            // A few views may drive parameters so far that the equations are no longer linear. A change is certain only if
+            // it is also found where nothing has changed.
+            match found.answer == Answer::Changed {
+                true => {
+                    of(TIGHT).map(|kept| if kept.answer == Answer::Changed { found } else { kept })
+                }
+                false => Ok(found),
+            }
+        });
+        found.unwrap_or_else(|missing| Check { missing: vec![missing], ..check })
     }
 }
 

@@ -1,7 +1,7 @@
 //! The normal equations of new views for changes of the cameras and errors of the board.
 //!
-//! They are formed at the minimum of a calibration with a loose prior, so that large changes are close to linear, for the
-//! residuals with the earlier parameters.
+//! They are formed for the residuals with the earlier parameters, at a minimum with a prior of a given width: a [`LOOSE`] one,
+//! so that large changes are close to linear, or a [`TIGHT`] one, so that the equations are exact if nothing has changed.
 
 use std::collections::BTreeSet;
 
@@ -31,6 +31,9 @@ use deltille_core::statistics::median;
 /// change, and narrow enough that they do not drive parameters far where they hardly determine them.
 pub(super) const LOOSE: f64 = 5.0;
 
+/// The same of a prior that keeps the cameras as calibrated.
+pub(super) const TIGHT: f64 = 0.01;
+
 /// The normal equations of all new views. The poses of the target are eliminated.
 pub(super) struct Views {
     /// JᵀJ, Jᵀr and rᵀr of the whitened residuals with the earlier parameters; the unknowns are those of the cameras,
@@ -52,10 +55,10 @@ pub(super) struct Views {
 }
 
 impl Views {
-    /// Forms the equations of the views of all cameras.
-    pub(super) fn of(views: &Calibration, earlier: &Earlier) -> Result<Self, Missing> {
+    /// Forms the equations of the views of all cameras; the prior is `width` times as wide as the calibration is uncertain.
+    pub(super) fn of(views: &Calibration, earlier: &Earlier, width: f64) -> Result<Self, Missing> {
         let no_views = || Missing::Views { camera: String::new() };
-        let problem = start(views, earlier)?;
+        let problem = start(views, earlier, width)?;
         let left_out = vec![false; problem.blocks.len()];
         let kept = Kept { problem, left_out, some_stand_out: false, factor: None };
         let settled = settle(kept, views.weights, views.loss).map_err(|_| no_views())?;
@@ -160,8 +163,8 @@ fn at_least(problem: &Problem, whitening: Whitening, earlier_px: Option<f64>) ->
     (Whitening { common_px: Some(earlier), ..whitening }.of(problem), 1.0)
 }
 
-/// The problem with the poses of all frames, and loose priors of the cameras.
-fn start(views: &Calibration, earlier: &Earlier) -> Result<Problem, Missing> {
+/// The problem with the poses of all frames, and priors of the cameras.
+fn start(views: &Calibration, earlier: &Earlier, width: f64) -> Result<Problem, Missing> {
     for (of, known) in views.cameras.iter().zip(earlier.cameras) {
         if of.views.is_empty() {
             return Err(Missing::Views { camera: known.name.clone() });
@@ -181,8 +184,8 @@ fn start(views: &Calibration, earlier: &Earlier) -> Result<Problem, Missing> {
         let free = known.free();
         of.free = (0..of.free.len()).map(|index| free.contains(&index)).collect();
         of.pose_free = known.pose_sd.is_some();
-        let loose = earlier.parameters(index) * (LOOSE * LOOSE);
-        of.prior = Some(CameraPrior::new(&known.camera, &loose).ok_or(Missing::Covariance)?);
+        let prior = earlier.parameters(index) * (width * width);
+        of.prior = Some(CameraPrior::new(&known.camera, &prior).ok_or(Missing::Covariance)?);
     }
     Ok(problem)
 }
