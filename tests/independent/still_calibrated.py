@@ -9,7 +9,8 @@ differs from its description as `--board` says: stretched, bent and with displac
 `--board` mm. `--accuracy` is the value that deltille is given (by default the same); with `--other`, the new views show
 another print. With `--rig`, a second camera sees the board at the same time.
 
-Without a change, it counts the answers `changed`, of which the 95 % interval is printed (Clopper and Pearson 1934).
+Without a change, it counts the answers `changed`, of which the 95 % interval is printed (Clopper and Pearson 1934), and
+fails if it lies above the stated rate.
 With a change, each set of views is first checked unchanged; the camera (the second one of a rig) is then changed by
 `size` times the change that this check states it would have found, in a random direction: along cx and cy, in k1, as
 one of three bends, or of its pose. The answers that find and name it are counted. The projection, the noise and the
@@ -28,6 +29,8 @@ import numpy as np
 from scipy.stats import beta
 
 ROWS, COLS, EDGE_MM = 8, 11, 20.0
+# Stated rate of the answer `changed` for unchanged cameras.
+FALSE_ALARM = 1e-3
 WIDTH, HEIGHT = 1600, 1200
 TRUTH = dict(f=1000.0, cx=803.0, cy=596.0, k=[-0.2, 0.06, 1e-4, -2e-4])
 GRID = ["--grid", "checker", "--rows", str(ROWS), "--cols", str(COLS), "--edge", "20mm"]
@@ -83,11 +86,11 @@ def printed(random, size_mm):
     return points + sheets + random.normal(0, size_mm, points.shape) if size_mm > 0 else points
 
 
-def poses(random, count, board, eyes):
-    """Views in which every camera sees the whole board."""
+def poses(random, count, board, eyes, tilt=0.7):
+    """Views in which every camera sees the whole board, turned by up to `tilt` radians about both of its axes."""
     found = []
     while len(found) < count:
-        turn = random.uniform([-0.7, -0.7, -0.4], [0.7, 0.7, 0.4]) + 1e-9
+        turn = random.uniform([-tilt, -tilt, -0.4], [tilt, tilt, 0.4]) + 1e-9
         place = random.uniform([-200, -150, 260], [200, 150, 550])
         seen = np.concatenate([project(TRUTH, seen_from(board, (turn, place), eye)) for eye in eyes])
         if (seen > 20).all() and (seen < [WIDTH - 20, HEIGHT - 20]).all():
@@ -200,7 +203,7 @@ def of_calibration(args, index):
     counts, stated = collections.Counter(), collections.defaultdict(list)
     for _ in range(args.repeats):
         count = int(random.integers(low, high + 1))
-        views = poses(random, count, board, eyes)
+        views = poses(random, count, board, eyes, args.tilt)
         noises = noise(count)
         own = printed(random, args.board) if args.other else board
         write(folder / "check", cameras, own, views, noises, args.noise)
@@ -244,6 +247,7 @@ def main():
     parser.add_argument("--board", type=float, default=0.1)
     parser.add_argument("--noise", type=float, default=0.05)
     parser.add_argument("--other", action="store_true", help="check with another print of the board")
+    parser.add_argument("--tilt", type=float, default=0.7, help="largest tilt of the checked views, radians")
     parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args()
     with ThreadPoolExecutor(2) as pool:
@@ -254,6 +258,8 @@ def main():
     low, high = (beta.ppf([0.025, 0.975], [found, found + 1], [all_ - found + 1, all_ - found])).tolist()
     low, high = 0.0 if found == 0 else low, 1.0 if found == all_ else high
     print(f"{args.change} {args.size}: {dict(counts)} of {all_}; changed: {100 * low:.2f} to {100 * high:.2f} %")
+    if args.change == "none" and low > FALSE_ALARM:
+        raise SystemExit(f"more false alarms than stated, {100 * FALSE_ALARM} %")
     low, high = map(int, args.views.split("-"))
     for key in KEYS.values():
         medians = [[v for _, stated in results for v in stated[key, count]] for count in range(low, high + 1)]

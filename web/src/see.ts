@@ -280,7 +280,7 @@ export function see(): HTMLElement {
       known.replaceChildren(el("p", { class: "good" }, words.see.recognisedSolid(String((found.spec as { shape?: unknown }).shape ?? ""), found.tags)));
       return;
     }
-    const edge = el("input", { type: "number", min: 0.1, max: 1000, step: "any", required: true, value: spec.edge_mm, change: () => begin(resize(spec, edge, wrong)) });
+    const edge = el("input", { type: "number", min: 0.1, max: 1000, step: "any", required: true, value: spec.edge_mm, input: () => check(edge, wrong), change: () => begin(resize(spec, edge, wrong)) });
     const wrong = el("p", { class: "problem", role: "alert", hidden: true });
     known.replaceChildren(
       el("p", { class: "good" }, words.see.recognised(spec.grid ?? "deltille", spec.rows, spec.cols, spec.tags.family, spec.tags.first_id)),
@@ -290,10 +290,15 @@ export function see(): HTMLElement {
     );
   }
 
-  async function resize(spec: BoardSpec, edge: HTMLInputElement, wrong: HTMLElement): Promise<void> {
+  /** Whether an edge is valid; shows the message otherwise. */
+  function check(edge: HTMLInputElement, wrong: HTMLElement): boolean {
     wrong.textContent = mistaken([edge]) ?? "";
     wrong.hidden = edge.validity.valid;
-    if (!edge.validity.valid) return;
+    return edge.validity.valid;
+  }
+
+  async function resize(spec: BoardSpec, edge: HTMLInputElement, wrong: HTMLElement): Promise<void> {
+    if (!check(edge, wrong)) return;
     const edge_mm = Number(edge.value);
     const { family, first_id, spacing, border_bits, tags_in } = spec.tags;
     const { rows, cols, inverted, grid = "deltille" } = spec;

@@ -270,7 +270,10 @@ export function ofTemplate(text: string): Settings {
       values.set(known, String(Number(number) * (UNITS[unit] ?? 1)));
     } else if (known) values.set(known, value);
   }
-  return settled(values);
+  const ignored: string[] = [];
+  const found = settled(values, ignored);
+  if (ignored.length > 0) throw new Error(`${ignored.join(", ")}: not valid for ${ignored.length > 1 ? "these settings" : "this setting"}; correct the file`);
+  return found;
 }
 
 /** Returns a template of these settings for the command-line program. */

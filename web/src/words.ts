@@ -189,7 +189,7 @@ export const words = {
     recognisedBy: (tags: number, shown: number, corners: number) =>
       `${tagCount(tags)} decoded; ${shown} of ${corners} corners are in the image.${shown < corners ? " The board may extend beyond it." : ""}`,
     edge: "Tile edge, mm",
-    edgeHint: "A photograph cannot show the size of the print: measure it.",
+    edgeHint: "A photograph cannot show the size of the print. Measure an edge and enter it here: all distances scale with it.",
     looking: "Detecting…",
     found: (corners: number, tags: number) => `${corners} corners, ${tagCount(tags)}`,
     none: "nothing found",

@@ -53,6 +53,9 @@ pub struct FilmArgs {
 
 /// Whether the inputs are photographs and recordings, not detections.
 pub fn are_images(inputs: &[PathBuf]) -> anyhow::Result<bool> {
+    if let Some(missing) = inputs.iter().find(|path| !path.exists()) {
+        bail!("{}: no such file or folder", missing.display());
+    }
     let is_image = |path: &PathBuf| match path.is_dir() && !is_recording(path) {
         true => has_only_images(path),
         false => is_recording(path) || is_photograph(path),

@@ -60,13 +60,19 @@ pub struct GridArgs {
     #[arg(long, value_name = "KIND", requires = "edge", conflicts_with = "target")]
     grid: Option<Kind>,
     /// Number of corner rows of the untagged board
-    #[arg(long, requires_all = ["grid", "cols"], value_parser = whole(SIDES))]
+    #[arg(long, requires_all = ["grid", "cols"], conflicts_with = "target", value_parser = whole(SIDES))]
     rows: Option<u32>,
     /// Number of corners per row of the untagged board
-    #[arg(long, requires_all = ["grid", "rows"], value_parser = whole(SIDES))]
+    #[arg(long, requires_all = ["grid", "rows"], conflicts_with = "target", value_parser = whole(SIDES))]
     cols: Option<u32>,
     /// Edge length of a tile of the untagged board, such as 20mm
-    #[arg(long, requires = "grid", value_name = "LENGTH", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        requires = "grid",
+        conflicts_with = "target",
+        value_name = "LENGTH",
+        allow_hyphen_values = true
+    )]
     edge: Option<String>,
 }
 
