@@ -53,15 +53,13 @@ pub struct FilmArgs {
 
 /// Whether the inputs are photographs and recordings, not detections.
 pub fn are_images(inputs: &[PathBuf]) -> anyhow::Result<bool> {
-    if let Some(missing) = inputs.iter().find(|path| !path.exists()) {
-        bail!("{}: no such file or folder", missing.display());
-    }
     let is_image = |path: &PathBuf| match path.is_dir() && !is_recording(path) {
         true => has_only_images(path),
         false => is_recording(path) || is_photograph(path),
     };
     let (images, others): (Vec<_>, Vec<_>) = inputs.iter().partition(|path| is_image(path));
     if let ([image, ..], [other, ..]) = (images.as_slice(), others.as_slice()) {
+        ensure!(other.exists(), "{}: no such file or folder", other.display());
         let [image, other] = [image, other].map(|path| path.display());
         bail!("{image} contains images, and {other} does not: give either images or detections");
     }
