@@ -179,7 +179,7 @@ export function targetForm({ changed: report, chooseMesh, chooseLogo }: Given): 
     settings = shown;
     for (const radio of radios) radio.checked = radio.value === settings.kind;
     const isOpen = form.querySelector("details")?.open ?? false;
-    const name = el("input", { type: "text", value: settings.name, input: () => changed({ name: name.value }) });
+    const name = el("input", { type: "text", name: "name", value: settings.name, input: () => changed({ name: name.value }) });
     const group = (title: string, fields: HTMLElement[]) => el("fieldset", {}, el("legend", {}, title), ...fields);
     familyChoice = null;
     form.replaceChildren(

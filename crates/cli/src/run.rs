@@ -57,7 +57,7 @@ pub fn run_with<A: Parser>(
             detail!("finished in {:.2} s", terminal::run_time().as_secs_f64());
             result
         }
-        Err(error) if error.use_stderr() => Err(anyhow::anyhow!(one_line(&error, &arguments))),
+        Err(error) if error.use_stderr() => Err(anyhow::anyhow!(one_line(&error, &arguments, &command))),
         Err(help_or_version) => {
             // If the reader of the help text is gone, there is nothing to report.
             match help_or_version.print() {
@@ -128,17 +128,28 @@ fn with_help_option(mut arguments: Vec<OsString>) -> Vec<OsString> {
 }
 
 /// Options of other programs and of other commands of this one, and the option that does the same.
-const INSTEAD: [(&str, &str); 6] = [
-    ("--cols", "--squares, --tags or --circles"),
-    ("--dxf", "--laser dxf"),
-    ("--glb", "--gltf"),
-    ("--rows", "--squares, --tags or --circles"),
-    ("--squares", "--rows and --cols"),
-    ("--stl", "--3mf or --gltf"),
+const INSTEAD: [(&str, &[&str]); 6] = [
+    ("--cols", &["--squares", "--tags", "--circles", "--tiles"]),
+    ("--dxf", &["--laser dxf"]),
+    ("--glb", &["--gltf"]),
+    ("--rows", &["--squares", "--tags", "--circles", "--tiles"]),
+    ("--squares", &["--rows", "--cols", "--tiles"]),
+    ("--stl", &["--3mf", "--gltf"]),
 ];
 
+/// Returns those of the options in [`INSTEAD`] that the command has.
+fn instead(unknown: &str, command: &Command) -> Option<String> {
+    let (_, options) = INSTEAD.iter().find(|(given, _)| *given == unknown)?;
+    let is_known = |option: &str| {
+        let name = option.trim_start_matches("--").split(' ').next();
+        command.get_arguments().any(|own| own.get_long() == name)
+    };
+    let known: Vec<&str> = options.iter().copied().filter(|option| is_known(option)).collect();
+    (!known.is_empty()).then(|| known.join(" or "))
+}
+
 /// Returns the first paragraph of a clap message and its tip on one line.
-fn one_line(error: &clap::Error, arguments: &[OsString]) -> String {
+fn one_line(error: &clap::Error, arguments: &[OsString], program: &Command) -> String {
     if error.kind() == ErrorKind::InvalidUtf8 {
         let arguments = (1..).zip(arguments.iter().skip(1));
         let wrong: Vec<String> = arguments
@@ -166,7 +177,8 @@ fn one_line(error: &clap::Error, arguments: &[OsString]) -> String {
     }
     if let (ErrorKind::UnknownArgument, Some(unknown)) =
         (error.kind(), text_of(ContextKind::InvalidArg))
-        && let Some((_, instead)) = INSTEAD.iter().find(|(given, _)| *given == unknown)
+        && let Some(command) = arguments.get(1).and_then(|name| program.find_subcommand(name))
+        && let Some(instead) = instead(unknown, command)
     {
         return format!("unknown option {unknown}; did you mean {instead}?");
     }

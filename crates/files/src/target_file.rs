@@ -24,7 +24,7 @@ const MADE: [&str; 10] = ["pdf", "svg", "png", "glb", "obj", "stl", "dxf", "mtl"
 #[non_exhaustive]
 pub enum TargetReadError {
     /// A file that was generated from a target.
-    #[error("{}: a .{extension} file does not describe a target: use the .json written with it", path.display())]
+    #[error("{}: a .{extension} file does not describe a target: use the .json that the command for the target, such as `deltille board`, wrote", path.display())]
     Made {
         /// The file.
         path: PathBuf,

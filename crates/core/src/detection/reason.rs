@@ -180,7 +180,11 @@ impl fmt::Display for Reason {
                 figure("blur_px")
             ),
             ReasonKind::NoGrid => {
-                write!(f, "found {}, but they do not form a grid", count("corners", "corner"))
+                write!(
+                    f,
+                    "found {}, but no grid: the target is covered, too small, blurred by motion, or not in the image",
+                    count("corners", "corner")
+                )
             }
             ReasonKind::TooSmall => write!(
                 f,

@@ -9,7 +9,7 @@ use super::text::MissingGlyph;
 use crate::{
     Label, LineKind, Placement, Printing, SheetLayout, edge_numbers, edge_text, upright_number,
 };
-use deltille_core::targets::{Target, TargetError, TargetSpec};
+use deltille_core::targets::{Target, TargetError, TargetSpec, format_mm};
 
 /// Gap between panels, mm: wider than any kerf.
 pub(super) const GAP_MM: f64 = 4.0;
@@ -76,7 +76,9 @@ pub enum CuttingError {
     NotBoard(String),
     /// The kerf is too wide, or not a valid width.
     #[error(
-        "a kerf of {kerf_mm} mm is not between 0 mm and {:.3} mm, a quarter of the finest detail on the board",
+        "a kerf of {} is not between 0 mm and {:.3} mm, a quarter of the finest detail on the board; larger tiles allow a \
+         wider one",
+        format_mm(*kerf_mm),
         most_mm
     )]
     Kerf {
