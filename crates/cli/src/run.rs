@@ -57,7 +57,9 @@ pub fn run_with<A: Parser>(
             detail!("finished in {:.2} s", terminal::run_time().as_secs_f64());
             result
         }
-        Err(error) if error.use_stderr() => Err(anyhow::anyhow!(one_line(&error, &arguments, &command))),
+        Err(error) if error.use_stderr() => {
+            Err(anyhow::anyhow!(one_line(&error, &arguments, &command)))
+        }
         Err(help_or_version) => {
             // If the reader of the help text is gone, there is nothing to report.
             match help_or_version.print() {

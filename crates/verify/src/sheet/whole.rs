@@ -57,6 +57,10 @@ fn placed<'p>(
     placed.collect()
 }
 
+/// Lowest resolution, px/mm, at which the edges of check bars are measured to a fraction of a pixel: their end strokes fill
+/// at least one pixel completely.
+const SHARP_PX_PER_MM: f64 = 7.0;
+
 /// Measures the check bars. The position of the boards only determines where to search for them.
 pub(crate) fn check_bars(
     page: &Page,
@@ -64,12 +68,17 @@ pub(crate) fn check_bars(
     found_from_stated: &AffineMap,
     verdict: &mut SheetVerdict,
 ) {
+    // Sheets of several metres are drawn so coarsely that an edge may be anywhere in its pixel.
+    let tolerance_mm = match page.px_per_mm < SHARP_PX_PER_MM {
+        true => TOLERANCE_MM.max(page.px_per_mm.recip()),
+        false => TOLERANCE_MM,
+    };
     for (index, bar) in layout.check_bars.iter().enumerate() {
         let stated_mm = bar.length_mm();
         let found_mm =
             bars::measure(page, [bar.from_mm, bar.to_mm].map(|end| found_from_stated.apply(end)));
         verdict.check_bars_mm.push((stated_mm, found_mm));
-        if found_mm.is_none_or(|found| (found - stated_mm).abs() > TOLERANCE_MM) {
+        if found_mm.is_none_or(|found| (found - stated_mm).abs() > tolerance_mm) {
             let finding = MarkFinding::CheckBar { bar: index + 1, found_mm, stated_mm };
             verdict.findings.push(finding.into());
         }
