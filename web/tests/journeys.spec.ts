@@ -557,7 +557,7 @@ test.describe("calibrate", () => {
     await expect(page.getByText("print scale changed after this calibration")).toBeHidden();
     await expect(page.getByText(/Reprojection error: 0\.0\d+ px/)).toBeVisible({ timeout: 60_000 });
     // Drawings are rounded to a tenth of a pixel. The page names a setting where the program names its option.
-    const [drawn, reported] = [(await press(page, "Full report")).toString(), read("camera-report.html").replace(/<span class="option">--(?:print-scale|measured)(.?)<\/span>/, "scale$1")].map(split);
+    const [drawn, reported] = [(await press(page, "Full report")).toString(), read("camera-report.html").replace(/<span class="option">--(?:print-scale|measured)(.?)<\/span>/, "the print scale$1")].map(split);
     expect(drawn?.words).toEqual(reported?.words);
     expect(Math.max(...(drawn?.numbers ?? []).map((number, i) => Math.abs(number - (reported?.numbers[i] ?? NaN))))).toBeLessThan(0.11);
 
