@@ -32,9 +32,7 @@ impl Calibration {
             let mut cameras = self.cameras.clone();
             cameras[a].views.clone_from(&self.cameras[b].views);
             cameras[b].views.clone_from(&self.cameras[a].views);
-            let found = self.of_cameras(cameras).checked(before);
-            let is_open = |missing: &Missing| matches!(missing, Missing::Undetermined { .. });
-            found.answer != Answer::Changed && found.missing.iter().all(is_open)
+            agrees(&self.of_cameras(cameras).checked(before))
         };
         pairs.into_iter().find(agree).map(|pair| pair.map(|of| before.cameras[of].name.clone()))
     }
@@ -65,15 +63,20 @@ impl Calibration {
             let found = of(LOOSE)?;
             // A few views may drive parameters so far that the equations are no longer linear. A change is certain only if
             // it is also found where nothing has changed.
-            match found.answer == Answer::Changed {
-                true => {
-                    of(TIGHT).map(|kept| if kept.answer == Answer::Changed { found } else { kept })
-                }
-                false => Ok(found),
-            }
+            let kept = match found.answer == Answer::Changed {
+                true => of(TIGHT).ok().filter(agrees),
+                false => None,
+            };
+            Ok(kept.unwrap_or(found))
         });
         found.unwrap_or_else(|missing| Check { missing: vec![missing], ..check })
     }
+}
+
+/// Whether the views fit the calibration, although they may not determine every change.
+fn agrees(found: &Check) -> bool {
+    let is_open = |missing: &Missing| matches!(missing, Missing::Undetermined { .. });
+    found.answer != Answer::Changed && found.missing.iter().all(is_open)
 }
 
 /// The answer from the equations of the views.
