@@ -1,7 +1,7 @@
 use glam::{DVec2, DVec3};
 
 use super::law::{Imaged, LensLaw, Ray};
-use super::reach::{product, sign_changes, slope_times_q};
+use super::reach::{product, sign_changes, slope_times_q, stays_positive};
 
 /// Smallest depth of a projected point, relative to its distance. Beyond 89.9° from the axis, a perspective
 /// projection is meaningless.
@@ -28,7 +28,7 @@ const ITERATIONS: usize = 20;
 ///     y' = y ρ + p1 (r² + 2y²) + 2 p2 xy + s3 r² + s4 r⁴
 /// ```
 ///
-/// Valid at angles below 89.9° from the axis where ρ is positive and r ρ increases with r.
+/// Valid at angles below 89.9° from the axis up to the first radius at which r ρ stops increasing.
 /// Parameters are in OpenCV's order:
 /// k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4.
 ///
@@ -183,7 +183,13 @@ impl LensLaw for BrownConrady {
     }
 
     fn covers(&self, DVec3 { x, y, z }: DVec3) -> bool {
-        self.radial((x * x + y * y) / (z * z)).valid
+        let q = (x * x + y * y) / (z * z);
+        let [k1, k2, k3] = self.radial;
+        match self.is_rational() {
+            true => self.radial(q).valid,
+            // ∂(r ρ)/∂r as a polynomial in r².
+            false => stays_positive(&[1.0, 3.0 * k1, 5.0 * k2, 7.0 * k3], q),
+        }
     }
 
     fn ray(&self, at: DVec2) -> Option<Ray> {
@@ -205,8 +211,7 @@ impl LensLaw for BrownConrady {
                 break;
             }
         }
-        let valid = self.radial(plane.length_squared()).valid;
-        Ray::central(plane.extend(1.0)).filter(|_| valid)
+        Ray::central(plane.extend(1.0)).filter(|_| self.covers(plane.extend(1.0)))
     }
 
     /// With ρ = A/B and q = r², the image grows with the power

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use glam::{DVec2, DVec3};
 
 use super::law::Imaged;
-use super::reach::sign_changes;
+use super::reach::{sign_changes, stays_positive};
 
 /// Steps of the angle in the search for a root, rad. Polynomials with the few terms in use do not have two extrema
 /// within a step.
@@ -50,11 +50,19 @@ pub(super) fn angle(k: &[f64], wanted: f64) -> Option<f64> {
 
 /// Returns r at the smallest θ up to π where the polynomial stops increasing.
 pub(super) fn monotonic_radius(k: &[f64]) -> Option<f64> {
-    // ∂r/∂θ as a polynomial in θ².
-    let mut slope = vec![1.0];
-    slope.extend(k.iter().enumerate().map(|(i, k)| (2 * i + 3) as f64 * k));
-    let turn = sign_changes(&slope, PI * PI).first().copied()?;
+    let turn = sign_changes(&slope(k), PI * PI).first().copied()?;
     Some(radius(k, turn.sqrt()).0)
+}
+
+/// Returns whether r increases from the axis up to an angle θ.
+pub(super) fn increases_to(k: &[f64], theta: f64) -> bool {
+    stays_positive(&slope(k), theta * theta)
+}
+
+/// Returns ∂r/∂θ as a polynomial in θ².
+fn slope(k: &[f64]) -> Vec<f64> {
+    let terms = k.iter().enumerate().map(|(i, k)| (2 * i + 3) as f64 * k);
+    std::iter::once(1.0).chain(terms).collect()
 }
 
 /// Angle of a point and its derivatives with respect to the position.

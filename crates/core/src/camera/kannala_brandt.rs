@@ -54,6 +54,10 @@ impl LensLaw for KannalaBrandt {
         equidistant::image(&self.k, point, &angle)
     }
 
+    fn covers(&self, point: DVec3) -> bool {
+        equidistant::increases_to(&self.k, point.x.hypot(point.y).atan2(point.z))
+    }
+
     fn ray(&self, at: DVec2) -> Option<Ray> {
         let r = at.x.hypot(at.y);
         if r == 0.0 {

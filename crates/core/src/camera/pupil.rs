@@ -128,6 +128,10 @@ impl LensLaw for Pupil {
         Some(Imaged { at, by_point })
     }
 
+    fn covers(&self, point: DVec3) -> bool {
+        self.angle(point).is_some_and(|(angle, _)| equidistant::increases_to(&self.k, angle.theta))
+    }
+
     fn ray(&self, at: DVec2) -> Option<Ray> {
         let mut plane = at;
         for _ in 0..ITERATIONS {

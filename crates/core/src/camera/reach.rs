@@ -91,8 +91,17 @@ pub(super) fn sign_changes(polynomial: &[f64], end: f64) -> Vec<f64> {
     changes.collect()
 }
 
+/// Returns whether a polynomial with a positive constant term stays positive between 0 and `end`.
+pub(super) fn stays_positive(polynomial: &[f64], end: f64) -> bool {
+    // Without its positive terms, a polynomial is smallest at the end.
+    let falling = polynomial[1..].iter().rev().fold(0.0, |sum, k| (sum + k.min(0.0)) * end);
+    polynomial[0] + falling > 0.0 || sign_changes(polynomial, end).is_empty()
+}
+
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::camera::{BrownConrady, KannalaBrandt, Lens};
 
@@ -109,6 +118,30 @@ mod tests {
             assert!((found - root).abs() < 1e-12);
         }
         assert_eq!(sign_changes(&[-8.0, 14.0, -7.0, 1.0], 3.0).len(), 2);
+    }
+
+    #[test]
+    fn points_beyond_a_fold_have_no_image() {
+        // r (1 − 0.35 r² + 0.02 r⁴) folds at r = 1.03 and increases again from r = 3.07.
+        let radial = [-0.35, 0.02, 0.0];
+        // θ (1 − θ²/3 + θ⁴/40) folds at θ = 1.13 and increases again from θ = 2.51.
+        let k = vec![-1.0 / 3.0, 0.025, 0.0, 0.0];
+        let plane = BrownConrady { radial, ..BrownConrady::default() };
+        let fisheye = KannalaBrandt { k };
+        for lens in [Lens::BrownConrady(plane), Lens::KannalaBrandt(fisheye)] {
+            let camera = Camera::centred(1600, 1200, 100.0, lens);
+            for (angle, seen) in
+                [(0.5, true), (0.79, true), (1.2, false), (1.3, false), (3.0, false)]
+            {
+                let image = camera.project(DVec3::new(f64::sin(angle), 0.0, f64::cos(angle)));
+                assert_eq!(image.is_some(), seen, "{angle} rad: {image:?}, {:?}", camera.lens);
+            }
+            for x in 0..800 {
+                let pixel = DVec2::new(f64::from(x), 600.0);
+                let Some(ray) = camera.unproject(pixel) else { continue };
+                assert!(camera.project(ray.direction).unwrap().distance(pixel) < 1e-9);
+            }
+        }
     }
 
     #[test]

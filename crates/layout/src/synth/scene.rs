@@ -6,7 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use super::Surface;
 use super::occlusion::Shadow;
+use crate::placing::net::plane::bounds;
 use deltille_core::camera::{Camera, Pose};
+use deltille_core::polygon::clip;
 use deltille_core::raster::{Coverage, Gray, gaussian};
 
 /// Maximum distance between the image of an edge and its chords, px.
@@ -15,6 +17,10 @@ const MAX_CHORD_ERROR_PX: f64 = 1e-4;
 /// Maximum depth of the subdivision of an edge: 2¹⁰ chords follow the image of an
 /// edge through any lens.
 const MAX_DIVISIONS: u32 = 10;
+
+/// Outlines that the camera does not see completely are cut into parts down to this fraction of the paper. At the
+/// fold of a distortion, the image does not move to first order, so their steps are far below a pixel.
+const SMALLEST_PART: f64 = 1.0 / 256.0;
 
 /// Illumination and imperfections of an image.
 ///
@@ -143,14 +149,15 @@ impl Scene {
         let (width, height) = (camera.width as usize, camera.height as usize);
         let mut coverage = Coverage::new(width, height);
         for (surface, shadows) in self.seen_from(camera_from_target) {
-            let view =
-                View { camera, camera_from_surface: surface.camera_from(camera_from_target) };
+            let [left, lower, right, upper] = bounds(&surface.paper_mm);
+            let view = View {
+                camera,
+                camera_from_surface: surface.camera_from(camera_from_target),
+                smallest_part_mm: SMALLEST_PART * (right - left).max(upper - lower),
+            };
             let mut add = |outline: &[DVec2], solid: bool, value: f64| {
                 for part in lit(outline, &shadows) {
-                    let Some(part) = view.outline(&part) else {
-                        continue;
-                    };
-                    coverage.add(&clockwise(part, solid), value);
+                    view.draw(part, &mut |image| coverage.add(&clockwise(image, solid), value));
                 }
             };
             add(&surface.paper_mm, true, light.white - light.background);
@@ -182,10 +189,6 @@ impl Scene {
         let mut truth = Truth::default();
         for (surface, shadows) in self.seen_from(camera_from_target) {
             let camera_from_surface = surface.camera_from(camera_from_target);
-            // A surface that cannot be projected completely is not drawn either.
-            if (View { camera, camera_from_surface }).outline(&surface.paper_mm).is_none() {
-                continue;
-            }
             for &(id, row, col, place) in &surface.corners {
                 if shadows.iter().any(|shadow| shadow.hides(place)) {
                     continue;
@@ -224,9 +227,28 @@ impl Scene {
 struct View<'a> {
     camera: &'a Camera,
     camera_from_surface: Pose,
+    smallest_part_mm: f64,
 }
 
 impl View<'_> {
+    /// Passes the image of an outline to `add`. If the camera does not see all of the outline, it is halved until the
+    /// parts are visible or small.
+    fn draw(&self, outline: Vec<DVec2>, add: &mut impl FnMut(Vec<DVec2>)) {
+        if let Some(image) = self.outline(&outline) {
+            return add(image);
+        }
+        let [left, lower, right, upper] = bounds(&outline);
+        let extent = DVec2::new(right - left, upper - lower);
+        if outline.len() < 3 || extent.max_element() < self.smallest_part_mm {
+            return;
+        }
+        let middle = DVec2::new(left.midpoint(right), lower.midpoint(upper));
+        let across = if extent.x > extent.y { DVec2::X } else { DVec2::Y };
+        for side in [across, -across] {
+            self.draw(clip(&outline, |p| side.dot(p - middle)), add);
+        }
+    }
+
     fn project(&self, point: DVec2) -> Option<DVec2> {
         self.camera.project(self.camera_from_surface.apply(point.extend(0.0)))
     }
@@ -307,4 +329,68 @@ fn clockwise(mut polygon: Vec<DVec2>, solid: bool) -> Vec<DVec2> {
         polygon.reverse();
     }
     polygon
+}
+
+#[cfg(test)]
+mod tests {
+    use deltille_core::camera::{Lens, LensKind};
+    use deltille_core::polygon::rectangle;
+    use glam::DQuat;
+
+    use super::*;
+
+    /// White paper that extends beyond what a lens sees: beyond the fold of a distortion, and behind the camera. Every
+    /// pixel is white if its line of sight meets the paper.
+    #[test]
+    fn paper_is_drawn_wherever_a_pixel_sees_it() {
+        let barrel = |camera: Camera| {
+            let mut values = camera.parameters();
+            (values[4], values[5]) = (-0.35, 0.02);
+            camera.with_parameters(&values)
+        };
+        let centred = |focal_px, kind: LensKind| {
+            let lens: Lens = kind.lens(2, None).unwrap();
+            Camera::centred(320, 240, focal_px, lens)
+        };
+        let folded = barrel(centred(150.0, LensKind::BrownConrady));
+        let pinhole = Camera::pinhole(320, 240, 1.5);
+        let fisheye = centred(90.0, LensKind::KannalaBrandt);
+        for (camera, tilt) in [(folded, 0.2), (pinhole, 1.3), (fisheye, 1.2)] {
+            let pose = Pose {
+                rotation: DQuat::from_rotation_x(std::f64::consts::PI - tilt),
+                translation: DVec3::new(20.0, 30.0, 100.0),
+            };
+            let paper_mm = rectangle([-300.0, -250.0, 280.0, 260.0]).to_vec();
+            let surface = Surface {
+                panel: 0,
+                target_from_surface: Pose::IDENTITY,
+                paper_mm: paper_mm.clone(),
+                black_mm: Vec::new(),
+                corners: Vec::new(),
+            };
+            let light = Light::default().white(1.0).background(0.0).noise(0.0).blur_px(0.0);
+            let image = Scene { surfaces: vec![surface] }.render(&camera, &pose, &light);
+            let seen = |x: usize, y: usize| {
+                let ray = camera.unproject(DVec2::new(x as f64, y as f64))?;
+                let back = pose.inverse();
+                let (eye, along) = (back.translation, back.rotation * ray.direction);
+                let distance = -eye.z / along.z;
+                (distance > 0.0 && encloses(&paper_mm, (eye + distance * along).truncate()))
+                    .then_some(())
+            };
+            let mut white = 0;
+            let mut wrong = Vec::new();
+            for (y, x) in (0..240).flat_map(|y| (0..320).map(move |x| (y, x))) {
+                let expected = seen(x, y).is_some();
+                white += usize::from(expected);
+                // On the edge of the paper, a pixel is partly white.
+                let value = image.row(y)[x];
+                if (value > 0.999 && !expected) || (value < 0.001 && expected) {
+                    wrong.push((x, y));
+                }
+            }
+            assert!((10_000..70_000).contains(&white), "{white} white pixels");
+            assert!(wrong.len() < 3, "{} pixels: {:?}", wrong.len(), camera.lens);
+        }
+    }
 }
