@@ -62,6 +62,8 @@ pub struct ListVerdict {
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct CutVerdict {
+    /// Width and height of the drawing, mm.
+    pub size_mm: [f64; 2],
     /// Outlines found at their positions.
     pub outlines: usize,
     /// Fold lines found at their positions.
@@ -225,9 +227,10 @@ impl fmt::Display for ListVerdict {
 
 impl fmt::Display for CutVerdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { outlines, folds, engraved, max_deviation_mm, kerf_mm } = self;
+        let Self { size_mm: [width, height], outlines, folds, engraved, max_deviation_mm, kerf_mm } =
+            self;
         let (outlines, folds) = (counted(*outlines, "outline"), counted(*folds, "line"));
-        write!(f, "verified, {outlines} to cut, ")?;
+        write!(f, "verified, {width:.1} × {height:.1} mm, {outlines} to cut, ")?;
         match kerf_mm {
             None => write!(f, "{folds} to fold, {engraved} engraved, ")?,
             Some(0.0) => write!(f, "{engraved} engraved, ")?,

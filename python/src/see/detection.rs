@@ -11,6 +11,7 @@ use deltille::export::tables::{ImageRecord, folder};
 use deltille::export::{DETECTION_FORMATS, detection, overlay};
 use deltille::limits::Limits;
 use deltille::targets;
+use deltille_core::words::counted;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -521,11 +522,12 @@ impl Detection {
         let corners: usize = self.grids().map(|grid| grid.corners.len()).sum();
         let tags: usize = self.grids().map(|grid| grid.tags.len()).sum();
         let why = self.found.reasons.first().map_or(String::new(), |why| format!(": {why}"));
-        let name = &self.found.image;
-        format!(
-            "<Detection {name}: {} grids, {corners} corners, {tags} tags{why}>",
-            self.found.grids.len()
-        )
+        let image = &self.found.image;
+        let name = if image.is_empty() { String::new() } else { format!(" {image}") };
+        let [grids, corners, tags] =
+            [(self.found.grids.len(), "grid"), (corners, "corner"), (tags, "tag")]
+                .map(|(count, of)| counted(count, of));
+        format!("<Detection{name}: {grids}, {corners}, {tags}{why}>")
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, (String, Vec<Target>)> {

@@ -229,10 +229,7 @@ fn messages_of_detect() {
     }
     page.run(at, "deltille detect --grid deltille two.png flopped.png -o out --skip-existing");
     page.title("Unreadable images");
-    page.run(
-        at,
-        "deltille detect --grid deltille cut.png empty.png sheet/board.png missing.png -o left",
-    );
+    page.run(at, "deltille detect --grid deltille cut.png empty.png sheet/board.png -o left");
     assert_eq!(crate::common::folder::names(&at.join("left")), ["board.json"]);
     page.title("Invalid options");
     for args in [
@@ -254,6 +251,7 @@ fn messages_of_detect() {
         "--grid deltille sheet/board.png --rows -3 --cols 4",
         "--grid deltille sheet/board.png -j 0",
         "--grid deltille sheet/board.png other/board.png",
+        "--grid deltille sheet/board.png missing.png -o left",
         "--grid deltille empty.dsc",
         "--grid deltille other/*.jpg",
         "--grid deltille - -",

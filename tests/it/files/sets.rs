@@ -50,7 +50,7 @@ fn a_new_folder_with_the_name_of_a_file_is_refused() {
     };
     for args in [
         "board --rows 4 --cols 5",
-        "detect --target b.json none.png",
+        "detect --target b.json b.json",
         "undistort --camera c.yaml",
         "rig --camera a=a --camera b=b --target b.json",
         "calibrate none --target b.json",
@@ -62,7 +62,7 @@ fn a_new_folder_with_the_name_of_a_file_is_refused() {
         "-o: out.yaml looks like a file, but a folder is needed",
     );
     refused(
-        "detect --target b.json none.png other.png -o out.csv",
+        "detect --target b.json b.json b.json -o out.csv",
         "must be a folder, because several",
     );
     refused("board --rows 4 --cols 5 --name c -o d.pdf", "--name: -o already names the files d");

@@ -86,7 +86,7 @@ fn impossible_views_are_refused_in_one_line() {
     refused("undistort --camera camera.yaml --size 60000x60000", "--max-pixels");
     refused("undistort --camera none.yaml", "none.yaml");
     refused("rectify camera.yaml --pair a,b", "camera.yaml");
-    refused("rectify camera.yaml --pair a,a", "two cameras");
+    refused("rectify camera.yaml --pair a,a", "two different cameras");
     let left: Vec<_> = fs::read_dir(folder.path()).unwrap().collect();
     assert_eq!(left.len(), 2);
 }

@@ -1,7 +1,8 @@
 //! Calibrates a camera from corners and writes its report.
 
 use deltille_calibrate::{
-    self, Calibration, HoldStatus, HoldTracker, Intrinsics, Model, NextView, Reference, View, views,
+    self, Calibration, HoldStatus, HoldTracker, Intrinsics, Model, NextView, Reference, Source,
+    View, views,
 };
 use deltille_core::camera::{CameraFile, Pose};
 use deltille_core::detection::{Detection, InkEstimate};
@@ -72,11 +73,15 @@ impl Solved {
         (page.print, page.models, page.poses) = (print, &models, &poses);
         page.notes
             .extend(camera_notes(read.iter().map(|(_, found)| found)).map(|notes| (0, notes)));
+        let noise_sd = || found.parameters.iter().map(|parameter| parameter.sd).collect();
+        let observed_sd = Some(found.observed_sd()).filter(|all| all.iter().any(Option::is_some));
+        let projection_sd_px = |source| found.projection_sd_px(None, source);
         let figures = serde_json::json!({
             "rms_px": found.rms_px, "views": found.views.len(), "corners": found.corner_count(),
             "names": found.camera.parameter_names(), "values": found.camera.parameters(),
-            "sd": found.parameters.iter().map(|parameter| parameter.sd).collect::<Vec<_>>(),
-            "projection_sd_px": found.projection_sd_px(None, deltille_calibrate::Source::Noise),
+            "sd": observed_sd.unwrap_or_else(noise_sd),
+            "projection_sd_px":
+                projection_sd_px(Source::Observed).or_else(|| projection_sd_px(Source::Noise)),
         });
         let json = calibration::write(&estimate, &diagnoses, print, Residuals::Omitted, &poses)
             .unwrap_or_default();

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
-use deltille_core::camera::Camera;
+use deltille_core::camera::{Camera, Lens};
 
 /// The image circle of a fisheye.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +32,10 @@ impl ImageCircle {
             return None;
         }
         let by_lens = || {
+            // A spline ends at its outermost knots, and these where the corners end.
+            if matches!(camera.lens, Lens::Spline(_)) {
+                return None;
+            }
             let radii = camera.corners_px().map(|corner| seen_towards(camera, corner));
             let radius_px = radii.into_iter().flatten().reduce(f64::min)?;
             Some(Self { centre_px: camera.centre_px, radius_px })

@@ -68,7 +68,7 @@ impl Misreading {
                     Mounting::EyeToHand => "the camera is on the flange (eye-in-hand)",
                 };
                 let own = if are_inverse { "base_from_flange" } else { "flange_from_base" };
-                format!("either they are {own}, or {other}; state which")
+                format!("change --inverse-poses if they are {own}, or --eye-to-hand if {other}")
             }
             Self::QuaternionOrder => {
                 "write quaternions in the order of their names, x y z w".to_owned()

@@ -11,10 +11,10 @@ use crate::quantity::Range;
 pub const MAX_LENS_PARAMETERS: usize = 12;
 
 /// Defines the enum of lenses. Each line contains a type, the name of the model in camera files,
-/// the name in messages, and a start value. The start value depends on the number of coefficients
+/// names of models that a file may contain instead, the name in messages, and a start value. The start value depends on the number of coefficients
 /// and an optional grid.
 macro_rules! lenses {
-    ($($(#[$doc:meta])* $lens:ident $name:literal $title:literal $given:pat => $start:expr,)*) => {
+    ($($(#[$doc:meta])* $lens:ident $name:literal [$($alias:literal)*] $title:literal $given:pat => $start:expr,)*) => {
         /// Projection from the camera frame to the normalised image plane.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Lens {
@@ -24,7 +24,7 @@ macro_rules! lenses {
         /// Kind of a lens.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
         pub enum LensKind {
-            $($(#[$doc])* #[serde(rename = $name)] $lens,)*
+            $($(#[$doc])* #[serde(rename = $name, $(alias = $alias),*)] $lens,)*
         }
 
         impl LensKind {
@@ -80,17 +80,17 @@ macro_rules! lenses {
 
 lenses! {
     /// Perspective with polynomial or rational distortion; sees less than 180°.
-    BrownConrady "pinhole" "a perspective lens" (_, None) => BrownConrady::default(),
+    BrownConrady "pinhole" ["radtan" "radtan5" "rational" "thin-prism"] "a perspective lens" (_, None) => BrownConrady::default(),
     /// Equidistant polynomial; sees more than 180° if its polynomial increases.
-    KannalaBrandt "fisheye" "a fisheye polynomial" (count, None) => KannalaBrandt { k: vec![0.0; count] },
+    KannalaBrandt "fisheye" ["kannala-brandt"] "a fisheye polynomial" (count, None) => KannalaBrandt { k: vec![0.0; count] },
     /// Extended unified model; sees more than 180°.
-    ExtendedUnified "eucm" "an EUCM lens" (_, None) => ExtendedUnified::default(),
+    ExtendedUnified "eucm" [] "an EUCM lens" (_, None) => ExtendedUnified::default(),
     /// Double sphere; sees more than 180°.
-    DoubleSphere "double-sphere" "a double sphere lens" (_, None) => DoubleSphere::default(),
+    DoubleSphere "double-sphere" [] "a double sphere lens" (_, None) => DoubleSphere::default(),
     /// Equidistant polynomial with a moving entrance pupil: not central.
-    Pupil "pupil" "a fisheye with a moving pupil" (_, None) => Pupil::default(),
+    Pupil "pupil" [] "a fisheye with a moving pupil" (_, None) => Pupil::default(),
     /// Stereographic with a spline correction; sees more than 180°.
-    Spline "spline" "a spline" (_, Some(grid)) => Spline::new(grid),
+    Spline "spline" [] "a spline" (_, Some(grid)) => Spline::new(grid),
 }
 
 impl Lens {

@@ -1,6 +1,8 @@
 //! Advice on how to improve a calibration. Every rule states its reason, and none depends on the kind of camera. Every
 //! diagnosis is a warning, so the page contains all warnings of the program.
 
+use glam::DVec2;
+
 use crate::report::content::Report;
 use crate::report::measures::survey::Survey;
 use deltille_calibrate::{CameraEstimate, Corner, Diagnosis, Excluded, Parameter, ViewEstimate};
@@ -38,6 +40,9 @@ pub struct Advice {
 const TILTED_RAD: f64 = 0.35;
 /// Minimum number of tilted views: about two axes, in both directions.
 const TILTED_VIEWS: usize = 4;
+/// Minimum of the sum over the tilted views of sin² of the angle between their direction and the most frequent one: one
+/// view at a right angle to the others.
+const ACROSS: f64 = 1.0;
 
 /// Minimum number of views: with fewer, an inconsistent view is hard to identify.
 const VIEWS: usize = 10;
@@ -109,7 +114,7 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     let outliers = report.estimate.outlier_count();
     if outliers > 0 {
         let text = format!(
-            "Outliers, drawn in red: {outliers} of {} corners.",
+            "{outliers} of {} corners are outliers: in red in the pictures of the views.",
             report.estimate.corner_count()
         );
         add(Weight::Hint, text);
@@ -211,8 +216,12 @@ fn views(
         );
     }
     if survey.planar {
-        let tilted = survey.views.iter().filter_map(|view| view.tilt_rad);
-        let tilted = tilted.filter(|&tilt| tilt > TILTED_RAD).count();
+        let tilted = survey.views.iter().filter(|view| view.tilt_rad > Some(TILTED_RAD));
+        let directions = tilted.clone().filter_map(|view| view.tilt_direction_rad);
+        // Opposite directions have the same axis, and the same double angle.
+        let doubled: DVec2 = directions.map(|at| DVec2::from_angle(2.0 * at)).sum();
+        let tilted = tilted.count();
+        let across = (tilted as f64 - doubled.length()) / 2.0;
         if tilted < TILTED_VIEWS {
             add(
                 Weight::Warning,
@@ -222,8 +231,19 @@ fn views(
                     report.target_noun()
                 ),
             );
+        } else if across < ACROSS {
+            add(
+                Weight::Hint,
+                format!(
+                    "{tilted} of {count} views are tilted by more than 20°, but all about the same axis of the image: also \
+                     tilt the {}, or turn the camera by 90°, about the other one.",
+                    report.target_noun()
+                ),
+            );
         } else {
-            add(Weight::Good, format!("{tilted} of {count} views are tilted by more than 20°."));
+            let text =
+                format!("{tilted} of {count} views are tilted by more than 20°, about both axes.");
+            add(Weight::Good, text);
         }
     }
     left_out(report, add, |out| match &out.camera {

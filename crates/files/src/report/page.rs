@@ -42,6 +42,7 @@ fn html(report: &Report) -> String {
         [only] => cells(&of_camera(report, 0, only)),
         _ => cells(&of_rig(report)),
     };
+    page += &calibrated_with(report);
     page += "</header>\n<section><h2>Summary</h2><ul class=\"advice\">";
     for piece in advice {
         let (class, sign) = class_and_sign(piece.weight);
@@ -164,13 +165,34 @@ fn class_and_sign(weight: Weight) -> (&'static str, &'static str) {
 fn uncertainty(report: &Report) -> String {
     let [camera] = report.estimate.cameras.as_slice() else { return String::new() };
     let distance = camera.projection.as_ref().and_then(|known| known.distances_mm.first().copied());
-    let known = distance.and_then(|mm| {
-        let sd = |source| camera.projection_sd_px(Some(mm), source);
-        Some((mm, sd(Source::Observed).or_else(|| sd(Source::Noise))?))
+    let known = |mm: Option<f64>| {
+        let sd = |source| camera.projection_sd_px(mm, source);
+        sd(Source::Observed).or_else(|| sd(Source::Noise))
+    };
+    let at = distance.and_then(|mm| Some(format!("{:.3} px at {mm:.0} mm", known(Some(mm))?)));
+    let far = known(None).map(|sd| format!("{sd:.3} px at infinity"));
+    let at: Vec<String> = at.into_iter().chain(far).collect();
+    if at.is_empty() {
+        return String::new();
+    }
+    let covered = 100.0 * Survey::new(camera).covered();
+    format!(
+        " Standard deviation of projections, where corners were seen ({covered:.0} % of the image): {}.",
+        at.join(", ")
+    )
+}
+
+/// The targets, and the scale of their print.
+fn calibrated_with(report: &Report) -> String {
+    let targets = report.estimate.calibrated_with.iter().map(ToString::to_string);
+    let targets: Vec<String> = targets.collect();
+    if targets.is_empty() {
+        return String::new();
+    }
+    let scale = report.print.scale.map_or(String::new(), |[across, up]| {
+        format!("; measured lengths of the print: {across:.5} across and {up:.5} up, times the nominal ones")
     });
-    known.map_or(String::new(), |(mm, sd)| {
-        format!(" Projection uncertainty (1σ) at {mm:.0} mm, within the region with corners: {sd:.3} px.")
-    })
+    format!("<p class=\"note\">Calibrated with {}{scale}.</p>", escaped(&targets.join(", ")))
 }
 
 /// The section with the measured corners of the target.
@@ -192,13 +214,18 @@ fn target(map: &TargetMap) -> String {
     section("Measured target", &body)
 }
 
-/// Escaped text that never breaks a line within an option such as `--board-shape`.
+/// Escaped text without line breaks in options such as `--board-shape`, and with the typeface of code between backticks.
 fn with_whole_options(text: &str) -> String {
     let word = |word: &str| match word.starts_with("--") {
         true => format!("<span class=\"option\">{}</span>", escaped(word)),
         false => escaped(word),
     };
-    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
+    let text = text.split(' ').map(word).collect::<Vec<_>>().join(" ");
+    let part = |(index, part): (usize, &str)| match index % 2 {
+        0 => part.to_owned(),
+        _ => format!("<code>{part}</code>"),
+    };
+    text.split('`').enumerate().map(part).collect()
 }
 
 #[cfg(test)]

@@ -60,6 +60,8 @@ fn stated(verifier: &Verifier, path: &Path) -> Result<CutDrawing, VerifyError> {
 
 /// Matches every stated path with a path of the file, and reports the unmatched ones on either side.
 pub(super) fn compare(found: CutDrawing, stated: CutDrawing, cut: &mut CutVerdict) -> Vec<Finding> {
+    let [left, lower, right, upper] = found.bounds_mm().unwrap_or_default();
+    cut.size_mm = [right - left, upper - lower];
     let mut left: Vec<CutPath> = found.paths;
     let mut missing = Vec::new();
     for path in stated.paths.into_iter().flat_map(pieces) {

@@ -28,7 +28,7 @@ fn names_in_files_do_not_escape_the_folder() {
         let commands = [
             "verify bad.json",
             "render bad.json --camera camera.yaml -o out",
-            "detect --target bad.json photo.png -o out",
+            "detect --target bad.json bad.json -o out",
             "calibrate corners --target bad.json --model radtan -o out/camera.yaml",
         ];
         for args in &commands[..if name.contains("31m") { 4 } else { 1 }] {

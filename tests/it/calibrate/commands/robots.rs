@@ -128,7 +128,11 @@ fn poses_that_cannot_be_used_are_refused() {
     said(&inverse, "the robot's poses look inverted");
     done(at, &format!("{HAND_EYE} --inverse-poses"));
     std::fs::write(at.join("poses.csv"), &table).unwrap();
-    refused(at, &format!("{HAND_EYE} --inverse-poses"), &["either they are base_from_flange"]);
+    refused(
+        at,
+        &format!("{HAND_EYE} --inverse-poses"),
+        &["change --inverse-poses if they are base_from_flange"],
+    );
     let same: String = (0..18).map(|index| line(&format!("{index:02}"), &poses[0])).collect();
     said(&(HEADER.to_owned() + &same), "each photograph has a pose of its own");
     let few: Vec<&str> = table.lines().take(3).collect();

@@ -11,7 +11,8 @@ use crate::interrupt;
 use crate::output::{self, Overwrite, log, report};
 use crate::run::{FAILED, UNDECIDED};
 use deltille::calibrate::{
-    Acceptance, AcceptanceRequest, Conformity, CornerLabel, KnownLength, Limit, Temperature,
+    Acceptance, AcceptanceError, AcceptanceRequest, Conformity, CornerLabel, KnownLength, Limit,
+    Temperature,
 };
 use deltille::export::acceptance::{self, Tested};
 use deltille::export::kind::Kind;
@@ -60,6 +61,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let page = page.transpose()?;
     let known = args.views.known()?;
     let request = args.request(&known.printing.target, &known.limits)?;
+    // What does not depend on the photographs fails before they are read.
+    let without = known.calibration.accept(&known.before, &request);
+    if let Err(error @ (AcceptanceError::Uncertainty | AcceptanceError::Temperature)) = without {
+        return Err(error).with_context(|| args.views.camera().display().to_string());
+    }
     let views = args.views.views(&known)?;
     if interrupt::has_ended_input() {
         log!("note: interrupted; nothing was written");

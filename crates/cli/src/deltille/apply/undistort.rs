@@ -119,7 +119,7 @@ fn pair(text: &str) -> Result<[String; 2], String> {
         Some((first, second)) if first != second && !first.is_empty() && !second.is_empty() => {
             Ok([first.to_owned(), second.to_owned()])
         }
-        _ => Err("expected the names of two cameras, such as left,right".to_owned()),
+        _ => Err("expected the names of two different cameras, such as left,right".to_owned()),
     }
 }
 

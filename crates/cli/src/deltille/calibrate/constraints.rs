@@ -4,6 +4,8 @@ use anyhow::{Context, anyhow, bail};
 
 use deltille::calibrate::{Constraint, ConstraintError, Intrinsics, Model};
 
+use crate::output::log;
+
 /// Constraints on parameters of cameras.
 #[derive(clap::Args)]
 pub struct ConstraintArgs {
@@ -80,7 +82,8 @@ impl ConstraintArgs {
         Ok(())
     }
 
-    /// Rejects constraints that a camera cannot have. Of several candidate models, one must have all parameters.
+    /// Rejects constraints that a camera cannot have. Of several candidate models, one must have all parameters; notes the
+    /// others.
     pub fn check(
         &self,
         camera: &str,
@@ -104,7 +107,19 @@ impl ConstraintArgs {
             }
             given => Constraint::check(some, given),
         };
-        let Err(error) = checked(&all) else { return Ok(()) };
+        let Err(error) = checked(&all) else {
+            let lacks =
+                |model: &&Model| Constraint::check(&all, &Intrinsics::Unknown(**model)).is_err();
+            let lacking: Vec<String> =
+                candidates.iter().filter(lacks).map(ToString::to_string).collect();
+            if !lacking.is_empty() && matches!(intrinsics, Intrinsics::Unknown(_)) {
+                log!(
+                    "note: not compared, because they lack a constrained parameter: {}",
+                    lacking.join(", ")
+                );
+            }
+            return Ok(());
+        };
         // The option whose constraint is wrong; else, constraints contradict each other.
         let is_wrong = |given: &&Given| {
             all.contains(&given.constraint)

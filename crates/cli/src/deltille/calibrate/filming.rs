@@ -257,8 +257,8 @@ impl Film<'_> {
             });
             let found: Vec<Option<anyhow::Result<Detection>>> = found.collect();
             let found: Vec<Option<Detection>> = found.into_iter().map(|one| seen.of(one)).collect();
-            let found_in = |found: &Detection| !found.grids.is_empty();
-            progress.add(found.iter().flatten().any(found_in), part);
+            let shows_target = |found: &Detection| found.reasons.is_empty();
+            progress.add(found.iter().flatten().any(shows_target), part);
             keyframes.add(name, found);
         }
         progress.end();
@@ -303,7 +303,7 @@ impl Film<'_> {
                 let (stem, part) = (frame.stem(), frame.part());
                 let one = self.one(frame, |image, name| tracker.detect(image, name))?;
                 let mut progress = progress.lock().expect("no thread panics here");
-                progress.add(!one.grids.is_empty(), part);
+                progress.add(one.reasons.is_empty(), part);
                 found.push((stem, one));
             }
             Ok(found)
@@ -352,7 +352,7 @@ impl Film<'_> {
                     .and_then(|frame| self.one(frame, |image, name| detector.detect(image, name)));
                 if let Ok(found) = &one {
                     let mut progress = progress.lock().expect("no thread panics here");
-                    progress.add(!found.grids.is_empty(), None);
+                    progress.add(found.reasons.is_empty(), None);
                 }
                 found.lock().expect("no thread panics here").insert(index, (stem, one));
             });

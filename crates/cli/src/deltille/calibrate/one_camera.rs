@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 
 use super::compensation::{self, prepare};
-use super::report_page::check_images;
+use super::report_page::note_missing;
 use super::sightings::{Sightings, SightingsArgs};
 use super::solving::{
     Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out, pose_uncertainty,
@@ -77,6 +77,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             file.ending
         );
     }
+    if let Some(path) = args.images.as_ref().filter(|path| !path.is_dir()) {
+        bail!("--images: {} is not a folder", path.display());
+    }
+    ensure!(
+        !args.solve.residuals || args.format.iter().any(|format| format.is_own()),
+        "--residuals: the .json that lists them is written with --format own"
+    );
     let stem = place.file.map_or(stem.to_owned(), |file| file.stem);
     let path = place.folder.join(format!("{stem}.yaml"));
     if let Some(known) = &args.fixed_intrinsics {
@@ -121,7 +128,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         log!("{}: excluded: no board found", picture.display());
     }
     if let Some(folder) = &args.images {
-        check_images(folder, &views)?;
+        note_missing(folder, &views);
     }
     let constraints = args.solve.constraints.of(&stem, &intrinsics);
     let mut calibration = calibration.camera(&stem, views, intrinsics);

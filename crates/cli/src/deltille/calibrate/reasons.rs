@@ -17,10 +17,11 @@ impl Reasons {
         }
     }
 
-    /// Reports that none of these images shows the target, with the most frequent reason.
+    /// Reports that none of these images shows the target, with all reasons, the most frequent one first.
     pub fn nothing_shown(&self, images: &str) -> String {
-        let most = self.0.values().max_by_key(|(count, _)| *count);
-        let why = most.map(|(count, why)| format!("; {count} of them: {why}")).unwrap_or_default();
-        format!("no board of this kind found in {images}{why}")
+        let mut reasons: Vec<_> = self.0.values().collect();
+        reasons.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
+        let reasons = reasons.iter().map(|(count, why)| format!("; {count} of them: {why}"));
+        format!("no board of this kind found in {images}{}", reasons.collect::<String>())
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, ensure};
+use anyhow::Context;
 
 use super::solving::Calibrated;
 use crate::output::{self, Overwrite, log};
@@ -91,9 +91,8 @@ fn picture_of(image: &str, folder: &Path) -> Option<PathBuf> {
     is_within(image).then(|| folder.join(image)).filter(|path| path.is_file())
 }
 
-/// Rejects paths that are not folders, and warns about missing images of views.
-pub fn check_images(folder: &Path, views: &[View]) -> anyhow::Result<()> {
-    ensure!(folder.is_dir(), "--images: {} is not a folder", folder.display());
+/// Warns about missing images of views.
+pub fn note_missing(folder: &Path, views: &[View]) {
     let missing = views.iter().filter(|view| picture_of(&view.image, folder).is_none());
     let missing: Vec<&str> = missing.map(|view| view.image.as_str()).collect();
     if let Some(first) = missing.first() {
@@ -104,5 +103,4 @@ pub fn check_images(folder: &Path, views: &[View]) -> anyhow::Result<()> {
             folder.display()
         );
     }
-    Ok(())
 }

@@ -66,7 +66,7 @@ pub struct SolveArgs {
     uncertainty_at: Vec<f64>,
     /// Include every corner with its residual in the .json (150 bytes each)
     #[arg(long)]
-    residuals: bool,
+    pub residuals: bool,
     #[command(flatten)]
     pub constraints: ConstraintArgs,
     #[command(flatten)]

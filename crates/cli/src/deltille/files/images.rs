@@ -217,11 +217,10 @@ pub fn photographs_in(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     frames::photographs_in(folder).with_context(|| format!("cannot read {}", folder.display()))
 }
 
-/// Returns the files that match a pattern with `*`, `?` or `[…]`. Other arguments are returned unchanged; errors are
-/// reported when they are opened.
+/// Returns the files that match a pattern with `*`, `?` or `[…]`; fails for other arguments, which do not exist.
 fn matching(argument: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let Some(pattern) = argument.to_str().filter(|text| text.contains(['*', '?', '['])) else {
-        return Ok(vec![argument.to_owned()]);
+        bail!("{}: no such file or folder", argument.display());
     };
     let paths = glob::glob(pattern).with_context(|| format!("{pattern}: invalid pattern"))?;
     let images: Vec<PathBuf> = paths.flatten().filter(|path| path.is_file()).collect();

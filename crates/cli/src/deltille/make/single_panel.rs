@@ -31,7 +31,7 @@ pub struct PrintingArgs {
     /// Add a page with a picture of the target, instructions for the sheet, and a ruler
     #[arg(long, help_heading = PAPER)]
     guide_page: bool,
-    /// Blank margin along the edges of the paper, at least 0.5 mm [default: 5mm]
+    /// Blank margin along the edges of the paper; at least 0.5 mm are kept blank [default: 5mm]
     #[arg(long, help_heading = PAPER, value_name = "LENGTH", value_parser = parse_length_mm)]
     margin: Option<f64>,
     /// Write <name>.pdf (default unless --svg or --png is given)

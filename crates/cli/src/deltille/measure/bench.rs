@@ -37,7 +37,7 @@ struct AllArgs {
     #[arg(long)]
     large: bool,
     /// Seed of the random number generator
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0..=u64::MAX))]
     seed: u64,
 }
 

@@ -167,7 +167,7 @@ struct PhotographsArgs {
 #[derive(clap::Args)]
 struct SimulationArgs {
     /// Seed of the random number generator
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0..=u64::MAX))]
     seed: u64,
     /// Number of threads [default: one per processor]
     #[arg(short, value_name = "N", value_parser = whole(1..=1024u16))]

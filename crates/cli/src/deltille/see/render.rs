@@ -11,7 +11,7 @@ use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::written::{bytes_file, text_file, write_all};
 use crate::deltille::files::{camera_file, target_file};
 use crate::output::{self, Overwrite, log, report};
-use crate::values::number;
+use crate::values::{number, whole};
 use deltille::camera::{Camera, Pose};
 use deltille::export::kind::signed_png;
 use deltille::export::truth;
@@ -57,7 +57,7 @@ pub struct Args {
           allow_hyphen_values = true, default_value = "0,0")]
     gradient: [f64; 2],
     /// Seed of the noise
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole(0..=u64::MAX))]
     seed: u64,
     /// Bits per pixel: 8 or 16
     #[arg(long, default_value_t = 8, value_parser = depth)]

@@ -10,7 +10,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec2Swizzles};
 use kurbo::PathEl;
 use rstar::primitives::GeomWithData;
 use rstar::{AABB, RTree};
@@ -19,7 +19,7 @@ use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 use super::mesh::smallest_cell_mm;
 pub use super::meshing::{INLAY_MM, MIN_INLAY_MM};
 use super::meshing::{MeshError, Meshing};
-use deltille_core::polygon::rectangle;
+use deltille_core::polygon::{hull, rectangle};
 use deltille_core::targets::{Panel, Polyhedron, Target, TargetError, TargetSpec};
 use deltille_layout::artwork::{Part, Shape, panel_shapes, subject};
 
@@ -59,6 +59,8 @@ pub struct InlaidBodies {
     pub black: Body,
     /// Edge of the smallest cell of a tag, mm; `None` without tags.
     pub cell_mm: Option<f64>,
+    /// Directions of the fronts of the boards in the target frame.
+    fronts: Vec<DVec3>,
 }
 
 impl InlaidBodies {
@@ -88,14 +90,39 @@ impl InlaidBodies {
         };
         let family = target.family().map_err(TargetError::from)?;
         let cell_mm = family.map(|family| smallest_cell_mm(target, Some(family)));
-        Ok(Self { name, subject: subject(target), white, black, cell_mm })
+        let fronts = target.panels.iter().map(|panel| panel.pose.matrix() * DVec3::Z).collect();
+        Ok(Self { name, subject: subject(target), white, black, cell_mm, fronts })
     }
 
-    /// Returns the extent along x, y and z in the target frame, mm.
-    pub fn size_mm(&self) -> DVec3 {
-        let vertices = || self.white.vertices_mm.iter().copied();
-        let least = vertices().reduce(DVec3::min).unwrap_or_default();
-        vertices().reduce(DVec3::max).unwrap_or_default() - least
+    /// Returns width, depth and height, mm, of the bodies with a board on the bed of a printer, and the scale at which
+    /// they just fit on a bed of this width and depth. Of all boards, and of all sides along the bed, those are used that
+    /// fit best.
+    pub fn on_bed(&self, [width_mm, depth_mm]: [f64; 2]) -> (DVec3, f64) {
+        let mut best = (DVec3::ZERO, 0.0);
+        for &front in &self.fronts {
+            let (x, y) = front.any_orthonormal_pair();
+            let vertices = || self.white.vertices_mm.iter();
+            let footprint = hull(vertices().map(|at| DVec2::new(x.dot(*at), y.dot(*at))).collect());
+            let heights = vertices().map(|at| front.dot(*at));
+            let (low, high) = (
+                heights.clone().fold(f64::INFINITY, f64::min),
+                heights.fold(f64::NEG_INFINITY, f64::max),
+            );
+            for (i, &corner) in footprint.iter().enumerate() {
+                let side = footprint[(i + 1) % footprint.len()] - corner;
+                let along = DVec2::new(side.x, -side.y).normalize_or(DVec2::X);
+                let turned: Vec<DVec2> = footprint.iter().map(|at| along.rotate(*at)).collect();
+                let least = turned.iter().copied().fold(DVec2::INFINITY, DVec2::min);
+                let size = turned.iter().copied().fold(DVec2::NEG_INFINITY, DVec2::max) - least;
+                for size in [size, size.yx()] {
+                    let scale = (width_mm / size.x).min(depth_mm / size.y);
+                    if scale > best.1 {
+                        best = (size.extend(high - low), scale);
+                    }
+                }
+            }
+        }
+        best
     }
 }
 

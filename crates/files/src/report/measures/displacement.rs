@@ -36,7 +36,7 @@ pub(in crate::report) const APART_PX: f64 = 0.05;
 /// The ideal lens that serves as reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::report) struct Ideal {
-    focal_px: DVec2,
+    pub focal_px: DVec2,
     pub centre_px: DVec2,
     is_pinhole: bool,
 }

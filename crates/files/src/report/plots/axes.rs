@@ -14,6 +14,8 @@ use std::fmt::Write as _;
 
 use glam::DVec2;
 
+use crate::report::html::escaped;
+
 /// Margins around the frame for the numbers and names of its axes, user units.
 const LEFT: f64 = 64.0;
 const BELOW: f64 = 40.0;
@@ -143,6 +145,13 @@ impl Axes {
             self.body,
             "<circle class=\"{class}\" cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"{radius}\"/>"
         );
+    }
+
+    /// Adds what `draw` adds, with a text that viewers show when the mouse points at it.
+    pub(super) fn titled(&mut self, title: &str, draw: impl FnOnce(&mut Self)) {
+        let _ = write!(self.body, "<g><title>{}</title>", escaped(title));
+        draw(self);
+        self.body += "</g>";
     }
 
     /// Adds text at a point, shifted by `by`, user units; `anchor` is a value of `text-anchor`.

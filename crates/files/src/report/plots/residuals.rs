@@ -8,7 +8,7 @@ use glam::DVec2;
 use crate::report::measures::survey::Survey;
 use crate::report::plots::axes::{Axes, frame};
 use crate::report::plots::round_down::round_down;
-use deltille_calibrate::{CameraEstimate, Corner};
+use deltille_calibrate::{CameraEstimate, Corner, ViewEstimate};
 
 /// Height of the legend below a map, user units.
 const FOOT: f64 = 58.0;
@@ -127,8 +127,11 @@ fn within(survey: &Survey, from: DVec2, arrow: DVec2) -> DVec2 {
     room(0).min(room(1)).min(1.0) * arrow
 }
 
-/// Map of the mean residuals over the image, enlarged, and its caption.
-pub(in crate::report) fn residual_map(survey: &Survey) -> (String, String) {
+/// Map of the mean residuals over the image, enlarged, and of the outliers, with its caption.
+pub(in crate::report) fn residual_map(
+    camera: &CameraEstimate,
+    survey: &Survey,
+) -> (String, String) {
     let cell = survey.size_px.x / survey.cells[0] as f64;
     let means = || survey.means_px.iter().flatten();
     let longest = means().map(|cell| cell.mean_px.length()).fold(0.0, f64::max);
@@ -145,6 +148,9 @@ pub(in crate::report) fn residual_map(survey: &Survey) -> (String, String) {
         axes.line(&[foot, foot + arrow], if chance { "arrow pale" } else { "arrow" });
         axes.dot(foot, 1.6, "foot");
     }
+    for outlier in camera.corners().filter(|corner| corner.outlier) {
+        axes.dot(outlier.pixel, 1.6, "dot out");
+    }
     if longest > 0.0 {
         let example = round_down(longest);
         let end = example * enlarged * axes.scale().x;
@@ -155,9 +161,13 @@ pub(in crate::report) fn residual_map(survey: &Survey) -> (String, String) {
         );
         axes.foot(FOOT, key);
     }
+    let outliers = match camera.outlier_count() {
+        0 => "",
+        _ => " Red dots are outliers, which the means do not contain.",
+    };
     let caption = format!(
         "Mean residual (observed minus predicted) in each cell of the image, enlarged {enlarged} times. A pattern of long \
-         arrows shows distortion that the model does not describe."
+         arrows shows distortion that the model does not describe.{outliers}"
     );
     (axes.svg(["x, px", "y, px"], "Mean residuals over the image"), caption)
 }
@@ -253,9 +263,15 @@ pub(in crate::report) fn against_place(
     let ranges = [[0.0, 1.05 * farthest], [0.0, 1.1 * worst]];
     let mut axes = Axes::new(frame(survey.size_px), ranges[0], ranges[1]);
     for (view, place) in camera.views.iter().zip(&places) {
-        axes.dot(DVec2::new(*place, view.rms_px), 3.0, "view");
+        let at = DVec2::new(*place, view.rms_px);
+        axes.titled(&named(view), |axes| axes.dot(at, 3.0, "view"));
     }
     (axes.svg([name, "rms of the view, px"], shows), caption)
+}
+
+/// The name and the RMS of a view.
+fn named(view: &ViewEstimate) -> String {
+    format!("{}: {:.4} px", view.name, view.rms_px)
 }
 
 /// RMS of each view, px, in order, with the overall RMS as a line.
@@ -267,11 +283,13 @@ pub(in crate::report) fn of_views(camera: &CameraEstimate, survey: &Survey) -> S
     // With many views, each bar is the worst of several.
     let step = views.len().div_ceil(MAX_BARS).max(1);
     for (bar, views) in views.chunks(step).enumerate() {
-        let px = views.iter().map(|view| view.rms_px).fold(0.0, f64::max);
+        let worst = views.iter().max_by(|a, b| a.rms_px.total_cmp(&b.rms_px));
+        let Some(worst) = worst else { continue };
         let first = (bar * step) as f64 + 0.5;
         let gap = 0.1 * step as f64;
-        let high = DVec2::new(first + views.len() as f64 - gap, px);
-        axes.bar(DVec2::new(first + gap, 0.0), high, "bar", "");
+        let high = DVec2::new(first + views.len() as f64 - gap, worst.rms_px);
+        let low = DVec2::new(first + gap, 0.0);
+        axes.titled(&named(worst), |axes| axes.bar(low, high, "bar", ""));
     }
     let all = DVec2::new(views.len() as f64 + 0.5, camera.rms_px);
     axes.line(&[DVec2::new(0.5, camera.rms_px), all], "curve");

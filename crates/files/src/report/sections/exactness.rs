@@ -11,7 +11,7 @@ pub(in crate::report) fn residuals(
     camera: &CameraEstimate,
     survey: &Survey,
 ) -> String {
-    let (arrows, caption) = residuals::residual_map(survey);
+    let (arrows, caption) = residuals::residual_map(camera, survey);
     let mut figures = vec![(arrows, caption)];
     figures.extend(board_residuals::plot(estimate, camera, survey));
     figures.push((
@@ -38,7 +38,8 @@ pub(in crate::report) fn residuals(
     ));
     figures.push((
         residuals::of_views(camera, survey),
-        "The rms of each view, in order. A step means that something changed; a peak means a bad image.".to_owned(),
+        "The rms of each view, in order, and of all views (line). A step means that something changed; a peak means a bad image. \
+         Point at a bar for the name of its view.".to_owned(),
     ));
     let (place, caption) = residuals::against_place(camera, survey);
     figures.push((place, caption.to_owned()));

@@ -6,6 +6,7 @@ use glam::{DVec2, DVec3};
 
 use crate::report::content::Report;
 use crate::report::html::escaped;
+use crate::report::measures::displacement::Ideal;
 use crate::report::sections::numbers::rounded;
 use deltille_calibrate::CameraEstimate;
 use deltille_core::camera::Camera;
@@ -34,12 +35,12 @@ pub(in crate::report) fn of_camera(
         )
     });
     cells.extend(field);
+    if found.outlier_count() > 0 {
+        cells.push((format!("{:.4} px", found.inlier_rms_px()), "rms without outliers".into()));
+    }
     cells.push((format!("{:.4} px", found.rms_px), "rms per axis".into()));
     if let Some(held_out) = report.held_out(index) {
         cells.push((format!("{:.4} px", held_out.rms_px), "rms on held-out views".into()));
-    }
-    if found.outlier_count() > 0 {
-        cells.push((format!("{:.4} px", found.inlier_rms_px()), "rms without outliers".into()));
     }
     cells.push((found.views.len().to_string(), "views".into()));
     cells.push((found.corner_count().to_string(), "corners".into()));
@@ -53,7 +54,8 @@ const FILM_DIAGONAL_MM: f64 = 43.267;
 /// The focal length in px, and in mm: on the sensor if the metadata of the photographs determine its size, otherwise on 35 mm
 /// film.
 fn focal_length(camera: &Camera, notes: Option<&CameraNotes>) -> [Figure; 2] {
-    let [fx, fy] = camera.focal_px.to_array();
+    // On the axis: some models scale their focal length, so that fx alone has no meaning.
+    let [fx, fy] = Ideal::of(camera, 0.0).focal_px.to_array();
     let [fx_text, fy_text] = [fx, fy].map(|focal| format!("{focal:.1}"));
     let px = match fx_text == fy_text {
         true => format!("{fx_text}\u{a0}px"),

@@ -27,7 +27,10 @@ pub(in crate::report) fn section(camera: &CameraEstimate, tried: &[Candidate]) -
                     "{own} describes the lens; {best} does so with fewer or better determined parameters."
                 )
             }
-            Some(_) => format!("{own} was used, but {best} describes the lens better: try it."),
+            Some(_) => format!(
+                "{own} was used, but of these models, {best} describes the lens best: try it, or --model auto, which also \
+                 compares models of other kinds."
+            ),
             None => String::new(),
         },
         _ => String::new(),

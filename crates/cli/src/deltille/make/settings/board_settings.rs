@@ -126,7 +126,7 @@ pub struct BoardSettings {
     /// Page orientation: auto, portrait or landscape [default: auto]
     #[arg(long, help_heading = PAPER)]
     orientation: Option<String>,
-    /// Blank margin along the edges of the paper, at least 0.5 mm [default: 5mm]
+    /// Blank margin along the edges of the paper; at least 0.5 mm are kept blank [default: 5mm]
     #[arg(long, help_heading = PAPER, value_name = "LENGTH", allow_hyphen_values = true)]
     margin: Option<String>,
     /// Write <name>.pdf (default unless --svg or --png is given)

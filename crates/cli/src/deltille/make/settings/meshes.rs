@@ -67,7 +67,8 @@ pub struct Meshes {
     /// less than the depth at which inlays of adjacent faces would meet [default: 0.4mm]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     inlay: Option<String>,
-    /// Width and depth of the printer's bed in mm, for a warning if the 3MF is larger [default: 256x256]
+    /// Width and depth of the printer's bed in mm, for a warning if the 3MF does not fit with a face on it [default:
+    /// 256x256]
     #[arg(long, value_name = "WxD", allow_hyphen_values = true)]
     bed: Option<String>,
     /// Diameter of the printer's nozzle, for a warning if cells of tags in the 3MF are smaller [default: 0.4mm]
@@ -220,9 +221,7 @@ impl Meshes {
         let bed = bed_mm(self.bed.as_deref().unwrap_or("256x256"))?;
         let nozzle_mm = length("nozzle", &self.nozzle)?.unwrap_or(0.4);
         ensure!(nozzle_mm > 0.0, "--nozzle: the diameter must be greater than 0, such as 0.4mm");
-        let size = bodies.size_mm();
-        let [longest, shortest] = [size.x.max(size.y), size.x.min(size.y)];
-        let scale = (bed[0].max(bed[1]) / longest).min(bed[0].min(bed[1]) / shortest);
+        let (size, scale) = bodies.on_bed(bed);
         if scale < 1.0 {
             let edge = edge_of(target)
                 .map_or(String::new(), |mm| format!("; --edge {}mm fits", (mm * scale).floor()));
