@@ -153,6 +153,7 @@ export function calibrate(): HTMLElement {
       solvedOf = asked();
       tally();
       show(await looking.call("calibrate", target(), all.map(({ json }) => json), all.map(({ name }) => stem(name)), model, printScale(scale.value)));
+      result.scrollIntoView({ block: "nearest" });
     } catch (error) {
       solvedOf = [];
       tally();
@@ -293,7 +294,7 @@ export function calibrate(): HTMLElement {
       }
       frames += 1;
       over.dataset.frames = String(frames);
-      if (rate === 0) live.scrollIntoView({ block: "nearest" });
+      if (rate === 0) over.scrollIntoView({ block: "center" });
       rate = 0.8 * rate + 0.2 * (1000 / (performance.now() - begin));
       live.textContent = `${guided ? "" : `${words.calibrate.hold} `}${words.calibrate.taken(taken.length)}, ${words.calibrate.rate(rate)}.`;
       await new Promise(requestAnimationFrame);

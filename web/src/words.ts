@@ -199,7 +199,7 @@ export const words = {
     recognisedBy: (tags: number, shown: number, corners: number) =>
       `${tagCount(tags)} decoded; ${shown} of ${corners} corners are in the image.${shown < corners ? " The board may extend beyond it." : ""}`,
     edge: "Tile edge, mm",
-    edgeHint: "A photograph cannot show the size of the print. Measure an edge and enter it here: all distances scale with it.",
+    edgeHint: "A photograph cannot show the size of the print. Measure an edge on it and enter it here: all distances scale with it. A measured edge includes the print scale: do not enter both.",
     looking: "Detecting…",
     found: (corners: number, tags: number) => `${corners} corners, ${tagCount(tags)}`,
     none: "nothing found",
@@ -228,7 +228,7 @@ export const words = {
     printScaleUsual: "1 (not measured)",
     printScaleHint: "Measured length / stated length of the check bars, across and up: 269.3/270, 199.6/200. One number applies to both.",
     noScale: (text: string) => `Print scale: ${text} is not a ratio from 0.5 to 2, such as 0.9974 or 269.3/270, or two of them, across and up.`,
-    farScale: (percent: number) => `Printers change lengths by less than ${percent} %: measure the check bars again, and check both numbers.`,
+    farScale: (percent: number) => `Print scale: printers change lengths by less than ${percent} %. Measure the check bars again, and check both numbers.`,
     wrongEdge: (message: string) => `The tile edge in “Detect” is not valid, and must be corrected there first. ${message}`,
     assumedEdge: (mm: number) => `Distances assume an edge of ${millimetres(mm)} mm, which was not measured: enter the measured edge in “Detect”. The camera parameters do not depend on it.`,
     aim: { made: (name: string) => `Target of the webcam: “${name}” of “Make”.`, seen: "Target of the webcam: the one of “Detect”.", none: "The webcam needs a target: design one in “Make”, or add a photograph of it in “Detect”." },

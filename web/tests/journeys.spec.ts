@@ -550,7 +550,7 @@ test.describe("calibrate", () => {
     await expect(page.getByRole("alert")).toContainText("Print scale: 269.3/270, 3 is not a ratio from 0.5 to 2");
     await page.getByLabel("Print scale").fill("2");
     await page.keyboard.press("Tab");
-    await expect(page.getByRole("status")).toContainText("Printers change lengths by less than 5 %");
+    await expect(page.getByRole("status")).toContainText("Print scale: printers change lengths by less than 5 %");
     await page.getByLabel("Print scale").fill("269.325/270, 0.9985");
     await page.getByRole("button", { name: "Calibrate", exact: true }).click();
     await expect(page.getByText(/Reprojection error: 0\.0\d+ px/)).toBeVisible({ timeout: 60_000 });
