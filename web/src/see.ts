@@ -81,8 +81,8 @@ function thumbnail({ width, height, grey }: Shown): HTMLCanvasElement {
   return canvas;
 }
 
-/** The message about a photograph, without the internals of its decoder. */
-const undecoded = (message: string): string => message.replace(/(^|: )(not a readable|damaged) .*/s, `$1${words.see.undecoded}`);
+/** The message about a photograph, without the internals of its decoder and settings that the page lacks. */
+const undecoded = (message: string): string => message.replace(/(^|: )(not a readable|damaged) .*/s, `$1${words.see.undecoded}`).replace(/[:;] (raise )?`max_pixels`.*/s, words.see.larger);
 
 export function see(): HTMLElement {
   /** The target searched for; null until it is chosen or identified. */

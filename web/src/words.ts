@@ -175,6 +175,7 @@ export const words = {
         "Photograph from the data set github.com/deltille/dataset (Ha, Perdoch, Alismail, So Kweon and Sheikh, “Deltille Grids for Geometric Camera Calibration”, ICCV 2017), under CC BY 4.0 (creativecommons.org/licenses/by/4.0), re-encoded as greyscale PNG.",
     },
     unreadable: "the file could not be read",
+    larger: "; the deltille program can read larger images",
     undecoded: "damaged, or not an image of a supported type: copy it again, or convert it to JPEG (HEIC and raw images, too)",
     noDescription: "not the description of a target",
     empty: "No photographs yet.",
