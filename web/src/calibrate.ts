@@ -9,6 +9,10 @@ import type { HoldStatus, Next, Result, Sought, Survey } from "./worker";
 
 /** Range of the print scale: beyond it, the check bars were misread. */
 const SCALES = [0.5, 2] as const;
+/** Largest deviation of the print scale from 1 that printers cause. */
+const DEVIATION = 0.05;
+/** Time after which a proposed pose that was not reached can be exchanged, ms. */
+const STUCK_MS = 10_000;
 
 /** The print scale across and up the sheet from ratios, or from quotients of measured and stated lengths; null without any. */
 function printScale(text: string): [number, number] | null {
@@ -29,6 +33,7 @@ export function calibrate(): HTMLElement {
   /** Whether images are captured at proposed poses, or at any new pose. */
   let guided = true;
   let next: Next | null = null;
+  let proposedAt = 0;
   /** Image coverage so far, and the inputs it was computed from. */
   let survey: Survey | null = null;
   let surveyOf: string[] = [];
@@ -55,6 +60,7 @@ export function calibrate(): HTMLElement {
   let takeNow = false;
   const forget = el("button", { type: "button", hidden: true, click: () => forgetAll() }, words.calibrate.forget);
   const scale = el("input", { type: "text", inputmode: "decimal", placeholder: words.calibrate.printScaleUsual, input: () => (scale.setCustomValidity(""), tally()), change: () => checkScale() });
+  const farScale = el("p", { class: "warning", role: "status", hidden: true }, words.calibrate.farScale(100 * DEVIATION));
   const empty = el(
     "div",
     { class: "empty" },
@@ -62,6 +68,7 @@ export function calibrate(): HTMLElement {
     el("p", {}, words.calibrate.empty),
     el("ol", {}, ...words.calibrate.steps.map(({ text, link, href }) => el("li", {}, text, link ? " " : null, link ? el("a", { href }, link) : null))),
   );
+  const aim = el("p", { class: "facts" });
   const webcam = el("button", { type: "button", click: () => void (stream ? stop() : start()) }, words.calibrate.webcam);
 
   /** The webcam's images if there are any, otherwise the photographs: they come from different cameras. */
@@ -75,6 +82,8 @@ export function calibrate(): HTMLElement {
 
   function tally(): void {
     count.textContent = words.calibrate.few(shots().length);
+    const isOfDetect = seen.sought && "target" in seen.sought;
+    aim.textContent = isOfDetect ? words.calibrate.aim.seen : made.json ? words.calibrate.aim.made(made.name) : words.calibrate.aim.none;
     forget.hidden = taken.length === 0;
     outdated.hidden = solvedOf.length === 0 || isSame(solvedOf, asked());
     empty.hidden = stream !== null || shots().length > 0;
@@ -115,13 +124,18 @@ export function calibrate(): HTMLElement {
 
   /** Reports an invalid print scale, and marks its field. */
   function checkScale(): void {
-    problem.hidden = true;
+    problem.hidden = farScale.hidden = true;
     try {
-      printScale(scale.value);
+      farScale.hidden = (printScale(scale.value) ?? []).every((ratio) => Math.abs(ratio - 1) <= DEVIATION);
     } catch (error) {
       scale.setCustomValidity((error as Error).message);
       showError(error);
     }
+  }
+
+  /** Refuses to continue with an earlier edge. */
+  function checkEdge(): void {
+    if (seen.wrongEdge) throw new Error(words.calibrate.wrongEdge(seen.wrongEdge));
   }
 
   async function solve(): Promise<void> {
@@ -132,12 +146,14 @@ export function calibrate(): HTMLElement {
       result.replaceChildren(el("p", { class: "busy" }, words.calibrate.detecting));
       result.scrollIntoView({ block: "nearest" });
       for (let known; known !== seen.done; ) await (known = seen.done);
+      checkEdge();
       const all = shots();
       if (all.length === 0) throw new Error(words.calibrate.noShots);
       result.replaceChildren(el("p", { class: "busy" }, words.calibrate.solving));
       solvedOf = asked();
       tally();
       show(await looking.call("calibrate", target(), all.map(({ json }) => json), all.map(({ name }) => stem(name)), model, printScale(scale.value)));
+      result.scrollIntoView({ block: "nearest" });
     } catch (error) {
       solvedOf = [];
       tally();
@@ -159,6 +175,7 @@ export function calibrate(): HTMLElement {
     result.replaceChildren(
       el("p", { class: said.length > 0 ? "facts" : "good" }, text.rms(figures.rms_px.toFixed(4), figures.views)),
       sure ? el("p", {}, text.sure(sure.toFixed(4))) : "",
+      seen.assumedEdge === null ? "" : el("p", { class: "warning" }, text.assumedEdge(seen.assumedEdge)),
       said.length > 0 ? el("ul", {}, ...said.map((sentence) => el("li", {}, sentence))) : el("p", {}, text.nothing),
       el("table", {}, el("thead", {}, el("tr", {}, ...[text.parameter, text.value, text.deviation].map((head) => el("th", { scope: "col" }, head)))), el("tbody", {}, ...rows)),
       el("div", { class: "buttons" }, ...files.map(({ name, text }) => el("button", { type: "button", click: () => save(name, text) }, name === "camera-report.html" ? words.calibrate.page : name))),
@@ -168,6 +185,7 @@ export function calibrate(): HTMLElement {
   /** Shows a proposed pose, or hides it. */
   function propose(proposed: Next | null): void {
     next = proposed;
+    proposedAt = performance.now();
     for (const part of [wish, state, elsewhere]) part.hidden = next === null;
     if (!next) return;
     const { description: proposal, uncertainty_px: px, expected_px: then, sufficient } = next;
@@ -180,9 +198,11 @@ export function calibrate(): HTMLElement {
   }
 
   async function start(): Promise<void> {
-    if (!target()) {
-      showError(new Error(words.calibrate.noTarget));
-      return;
+    try {
+      checkEdge();
+      if (!target()) throw new Error(words.calibrate.noTarget);
+    } catch (error) {
+      return showError(error);
     }
     try {
       stream = await navigator.mediaDevices.getUserMedia({ video: { width: { ideal: 1280 }, facingMode: "environment" } });
@@ -258,7 +278,8 @@ export function calibrate(): HTMLElement {
           showError(new Error(words.calibrate.held.unseen));
         }
         if (next) outline(context, next, found.held);
-        state.textContent = found.held ? (words.calibrate.held[found.held.held] ?? "") : "";
+        const isStuck = performance.now() - proposedAt > STUCK_MS;
+        state.textContent = found.held ? `${words.calibrate.held[found.held.held] ?? ""}${isStuck ? ` ${words.calibrate.stuck}` : ""}` : "";
         if (corners > 0 && (takeNow || (guided ? found.held?.held === "taken" : found.keep))) {
           taken.push({ name, json: found.json, corners, labelled: true });
           tally();
@@ -273,6 +294,7 @@ export function calibrate(): HTMLElement {
       }
       frames += 1;
       over.dataset.frames = String(frames);
+      if (rate === 0) over.scrollIntoView({ block: "center" });
       rate = 0.8 * rate + 0.2 * (1000 / (performance.now() - begin));
       live.textContent = `${guided ? "" : `${words.calibrate.hold} `}${words.calibrate.taken(taken.length)}, ${words.calibrate.rate(rate)}.`;
       await new Promise(requestAnimationFrame);
@@ -351,6 +373,9 @@ export function calibrate(): HTMLElement {
         field(words.calibrate.way, way),
         count,
         el("div", { class: "buttons" }, el("button", { type: "button", class: "first", click: () => void solve() }, words.calibrate.start), webcam, forget),
+        // Below the buttons, which must not move when they are clicked.
+        farScale,
+        aim,
       ),
       el("div", { class: "stage" }, problem, empty, wish, video, over, state, el("div", { class: "buttons" }, now, elsewhere), live, covered, drawings, outdated, result),
     ),

@@ -36,11 +36,11 @@ export function field(label: string, control: HTMLElement, hint?: string): HTMLE
   return el("div", { class: "field" }, el("label", { for: control.id }, label), control, below);
 }
 
-/** The message about an invalid number; the library's own message would not name the form field. */
-export function mistaken(numbers: Iterable<HTMLInputElement>): string | undefined {
-  const wrong = [...numbers].find((control) => !control.validity.valid);
+/** The message about an invalid value: the title of a text, or the range of a number. The library's own message would not name the form field. */
+export function mistaken(controls: Iterable<HTMLInputElement>): string | undefined {
+  const wrong = [...controls].find((control) => !control.validity.valid);
   // The labels of a control are not known before it is part of the page.
-  return wrong && words.mistaken(wrong.closest(".field")?.querySelector("label")?.textContent ?? "", Number(wrong.min), Number(wrong.max), wrong.step !== "any");
+  return wrong && words.mistaken(wrong.closest(".field")?.querySelector("label")?.textContent ?? "", wrong.title || words.range(Number(wrong.min), Number(wrong.max), wrong.step !== "any"));
 }
 
 export function select(options: [string, string][], value: string, changed: (value: string) => void): HTMLSelectElement {

@@ -77,7 +77,7 @@ export function make(): HTMLElement {
   const others = el("dl", { class: "formats" });
   const more = el("details", { class: "more", toggle: () => more.open && restart() }, el("summary", {}, text.formats), others);
   const verification = proof(() => [PDF, ...(more.open ? formats().filter(([format]) => !NOT_PROVED.includes(format)) : [])]);
-  more.append(verification.lines);
+  more.append(el("p", { class: "hint" }, text.laser), verification.lines);
   const chooser = el("input", { type: "file", accept: ACCEPTED, hidden: true, change: () => void load([...(chooser.files ?? [])], chooser.accept) });
   const choose = (accept: string) => {
     chooser.accept = accept;
@@ -186,7 +186,7 @@ export function make(): HTMLElement {
       sheets.replaceChildren(el("span", { class: "busy" }, text.drawing));
     }, LATE_MS);
     try {
-      const mistake = mistaken(form.querySelectorAll<HTMLInputElement>("input[type=number]"));
+      const mistake = mistaken(form.querySelectorAll<HTMLInputElement>("input"));
       if (mistake) {
         form.querySelector("details:has(:invalid)")?.toggleAttribute("open", true);
         throw new LibraryError(mistake);
@@ -198,6 +198,7 @@ export function make(): HTMLElement {
       if (isStale()) return;
       show(null);
       showError(error);
+      verification.restart(null, problem.textContent ?? "");
     } finally {
       clearTimeout(late);
     }

@@ -14,8 +14,8 @@ export type Proof = {
   state: HTMLElement;
   /** The line that `deltille verify` prints for each format. */
   lines: HTMLElement;
-  /** Ends a running verification, and begins another one when the user is idle; without settings, none. */
-  restart: (settings: string | null) => void;
+  /** Ends a running verification, and begins another one when the user is idle; without settings, none, and shows why there are no files. */
+  restart: (settings: string | null, reason?: string) => void;
 };
 
 /** Verifies the formats that `wanted` returns. */
@@ -45,7 +45,7 @@ export function proof(wanted: () => Format[]): Proof {
     for (let next; of !== null && (next = wanted().find(([format]) => !known.has(format))); ) {
       const settings: string = of;
       state.className = "state busy";
-      state.textContent = words.make.proving(next[1]);
+      state.textContent = words.make.proving(known.size > 0);
       const found = await line(settings, next);
       if (settings !== of) continue;
       known.set(next[0], found);
@@ -63,13 +63,13 @@ export function proof(wanted: () => Format[]): Proof {
     state.textContent = isProved ? words.make.proved(files, wanted().length > 1) : words.make.notProved;
   }
 
-  function restart(settings: string | null): void {
-    if (settings !== of) {
+  function restart(settings: string | null, reason = ""): void {
+    if (settings === null || settings !== of) {
       if (isRunning) proving.cancel();
       known = new Map();
       lines.replaceChildren();
-      state.className = "state";
-      state.textContent = "";
+      state.className = `state ${reason ? "bad" : ""}`;
+      state.textContent = reason;
       of = settings;
     }
     if (of !== null) begin();

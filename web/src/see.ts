@@ -37,6 +37,8 @@ type BoardSpec = {
 const MAGNIFIED = 24;
 /** Size of the ellipses, in standard deviations. */
 const ELLIPSE = 100;
+/** The largest paper: a board found in a photograph is not drawn. */
+const LARGEST = "5080x5080mm";
 /** File formats of the results; the last is behind “More formats”. */
 const RESULTS = ["json", "csv", "orpc"] as const;
 /** Width and height of a thumbnail, px. */
@@ -78,6 +80,9 @@ function thumbnail({ width, height, grey }: Shown): HTMLCanvasElement {
   canvas.getContext("2d")?.putImageData(shades, 0, 0);
   return canvas;
 }
+
+/** The message about a photograph, without the internals of its decoder and settings that the page lacks. */
+const undecoded = (message: string): string => message.replace(/(^|: )(not a readable|damaged) .*/s, `$1${words.see.undecoded}`).replace(/[:;] (raise )?`max_pixels`.*/s, words.see.larger);
 
 export function see(): HTMLElement {
   /** The target searched for; null until it is chosen or identified. */
@@ -132,6 +137,8 @@ export function see(): HTMLElement {
   function choose(value: string): void {
     choice = value;
     recognised = null;
+    seen.assumedEdge = null;
+    seen.wrongEdge = "";
     known.replaceChildren();
     if (value === "auto") sought = null;
     else if (value === "made") sought = { target: made.json, family: made.family };
@@ -237,7 +244,7 @@ export function see(): HTMLElement {
         photo.of = seen.sought = of;
       } catch (error) {
         if (turn !== asking) return;
-        photo.error = error instanceof LibraryError && error.message ? error.message : words.failed;
+        photo.error = error instanceof LibraryError && error.message ? undecoded(error.message) : words.failed;
       }
       if (at < 0 || at === index) {
         at = index;
@@ -276,11 +283,13 @@ export function see(): HTMLElement {
   /** Shows the identified target, and asks for its tile edge, which a photograph cannot show. */
   function showTarget(found: Recognised): void {
     const spec = found.spec as BoardSpec;
+    seen.assumedEdge = spec.edge_mm;
     if (spec.kind !== "board") {
-      known.replaceChildren(el("p", { class: "good" }, words.see.recognisedSolid(String((found.spec as { shape?: unknown }).shape ?? ""), found.tags)));
+      const shape = String((found.spec as { shape?: unknown }).shape ?? "");
+      known.replaceChildren(el("p", { class: "good" }, words.see.recognisedSolid(shape, found.tags)), el("p", { class: "facts" }, words.see.assumedSolid(spec.edge_mm)));
       return;
     }
-    const edge = el("input", { type: "number", min: 0.1, max: 1000, step: "any", required: true, value: spec.edge_mm, input: () => check(edge, wrong), change: () => begin(resize(spec, edge, wrong)) });
+    const edge = el("input", { type: "number", min: 1, max: 1000, step: "any", placeholder: words.see.assumedEdge(spec.edge_mm), input: () => check(edge, wrong), change: () => begin(resize(spec, edge, wrong)) });
     const wrong = el("p", { class: "problem", role: "alert", hidden: true });
     known.replaceChildren(
       el("p", { class: "good" }, words.see.recognised(spec.grid ?? "deltille", spec.rows, spec.cols, spec.tags.family, spec.tags.first_id)),
@@ -292,22 +301,28 @@ export function see(): HTMLElement {
 
   /** Whether an edge is valid; shows the message otherwise. */
   function check(edge: HTMLInputElement, wrong: HTMLElement): boolean {
-    wrong.textContent = mistaken([edge]) ?? "";
-    wrong.hidden = edge.validity.valid;
+    showWrong(wrong, mistaken([edge]) ?? "");
     return edge.validity.valid;
+  }
+
+  /** Shows the message about an invalid edge, which calibration refuses; an empty one hides it. */
+  function showWrong(wrong: HTMLElement, message: string): void {
+    wrong.textContent = seen.wrongEdge = message;
+    wrong.hidden = message === "";
   }
 
   async function resize(spec: BoardSpec, edge: HTMLInputElement, wrong: HTMLElement): Promise<void> {
     if (!check(edge, wrong)) return;
-    const edge_mm = Number(edge.value);
+    const edge_mm = edge.value === "" ? spec.edge_mm : Number(edge.value);
+    seen.assumedEdge = edge.value === "" ? spec.edge_mm : null;
     const { family, first_id, spacing, border_bits, tags_in } = spec.tags;
     const { rows, cols, inverted, grid = "deltille" } = spec;
     try {
-      const settings = { ...usual, kind: grid, rows, cols, edge_mm, inverted, family, first_id, tag_spacing: spacing, tag_border: border_bits, tags_in: tags_in ?? "black" };
+      const settings = { ...usual, kind: grid, rows, cols, edge_mm, inverted, family, first_id, tag_spacing: spacing, tag_border: border_bits, tags_in: tags_in ?? "black", paper: LARGEST };
       sought = { target: (await drawing.call("draw", asked(settings))).json };
       await again();
     } catch (error) {
-      showError(error);
+      showWrong(wrong, error instanceof LibraryError && error.message ? words.see.tooLarge : words.failed);
     }
   }
 
@@ -322,19 +337,36 @@ export function see(): HTMLElement {
     window.dispatchEvent(new Event("seen"));
   }
 
+  /** What was found in a photograph, and why it is not more. */
   function figures(photo: Photo): string {
     // The list shows the name already.
     if (photo.error) return photo.error.startsWith(`${photo.name}: `) ? photo.error.slice(photo.name.length + 2) : photo.error;
-    if (!photo.found || !photo.result) return words.see.looking;
+    // The first part of a sentence is the reason, the rest a remedy.
+    const reason = isUnidentified(photo) ? words.see.unidentified : photo.result?.reasons[0]?.split(/[:;]/)[0];
+    const state = stateOf(photo);
+    if (state === "missing") return reason ?? words.see.none;
+    return state === "unlabelled" && reason ? `${counts(photo)}; ${reason}` : counts(photo);
+  }
+
+  function counts(photo: Photo): string {
+    if (!photo.found) return words.see.looking;
     const corners = photo.found.grids.reduce((sum, grid) => sum + grid.corners.length, 0);
     const tags = photo.found.grids.reduce((sum, grid) => sum + grid.tags.length, 0);
     return corners === 0 ? words.see.none : words.see.found(corners, tags);
   }
 
-  function stateOf(photo: Photo): "failed" | "looking" | "missing" | "found" {
+  /** Whether a photograph shows corners, but its target was to be identified by tags, and was not. */
+  function isUnidentified({ of, found }: Photo): boolean {
+    return choice === "auto" && of !== null && "grid" in of && found !== null && found.grids.length > 0;
+  }
+
+  function stateOf(photo: Photo): "failed" | "looking" | "missing" | "unlabelled" | "found" {
     if (photo.error) return "failed";
     if (!photo.found) return "looking";
-    return photo.found.grids.some((grid) => grid.corners.length > 0) ? "found" : "missing";
+    if (photo.found.grids.length === 0) return "missing";
+    // Corners of untagged boards have no labels.
+    const isUntagged = photo.of !== null && "grid" in photo.of && choice !== "auto";
+    return isUntagged || photo.found.grids.some(({ panel }) => panel !== null) ? "found" : "unlabelled";
   }
 
   function pick(index: number): void {
@@ -419,7 +451,7 @@ export function see(): HTMLElement {
     if (!photo.result || !photo.found) {
       canvas.width = canvas.height = 0;
       hint.hidden = true;
-      status.textContent = photo.error || figures(photo);
+      status.textContent = photo.error || counts(photo);
       return;
     }
     const { width, height, grey, ms, reasons } = photo.result;
@@ -459,7 +491,10 @@ export function see(): HTMLElement {
       }
     });
     canvas.setAttribute("aria-label", `${photo.name}: ${figures(photo)}. ${words.see.keys}`);
-    status.textContent = [`${figures(photo)}, ${words.see.time(ms)}.`, ...reasons.map((reason) => `${reason.charAt(0).toUpperCase()}${reason.slice(1)}${reason.endsWith("?") ? "" : "."}`)].join(" ");
+    const sentences = reasons.map((reason) => `${reason.charAt(0).toUpperCase()}${reason.slice(1)}${reason.endsWith("?") ? "" : "."}`);
+    if (isUnidentified(photo)) sentences.push(words.see.chooseTarget);
+    if (photo.of && "target" in photo.of && /"kind"\s*:\s*"charuco"/.test(photo.of.target)) sentences.push(words.see.innerTags);
+    status.textContent = [`${counts(photo)}, ${words.see.time(ms)}.`, ...sentences].join(" ");
     hint.hidden = photo.found.grids.length === 0;
     hint.textContent = words.see.magnifier;
     const [first, second, other] = RESULTS.map((format) => el("button", { type: "button", click: () => save(`${stem(photo.name)}.${format}`, photo.result?.[format] ?? "") }, format.toUpperCase()));

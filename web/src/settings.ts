@@ -1,4 +1,6 @@
 // Settings of a target, as an address and as templates of the command-line programs.
+import { isPaper } from "./target-form";
+
 export type Settings = {
   kind: string;
   rows: number;
@@ -191,7 +193,7 @@ export function settled(values: Iterable<[string, string]>, ignored: string[] = 
     const isNumber = NUMBERS.includes(key);
     const isBoolean = typeof usual[key as keyof Settings] === "boolean";
     const choices = isBoolean ? ["true", "false"] : CHOICES[key];
-    const isValid = Object.hasOwn(usual, key) && (isNumber ? value !== "" && Number.isFinite(Number(value)) : (choices?.includes(value) ?? true));
+    const isValid = Object.hasOwn(usual, key) && (isNumber ? value !== "" && Number.isFinite(Number(value)) : key === "paper" ? isPaper(value) : (choices?.includes(value) ?? true));
     if (!isValid) ignored.push(`${key}=${value}`);
     else found[key] = isNumber ? Number(value) : isBoolean ? value === "true" : value;
   }
@@ -255,7 +257,7 @@ export function ofTemplate(text: string): Settings {
     table = /^\[(\w+)\]/.exec(bare)?.[1] ?? table;
     // Meshes and laser drawings are additional files of the same target.
     if (table === "meshes" || table === "laser") continue;
-    if (table !== "") throw new Error(`[${table}]: the page does not support this table; use the template with the command-line program`);
+    if (table !== "") throw new Error(`[${table}]: the page does not support this table; the deltille program can use this template`);
     const [, key = "", string, plain] = /^([\w-]+)\s*=\s*(?:"([^"]*)"|([\w.+-]+))\s*(?:#.*)?$/.exec(bare) ?? [];
     const known = KEYS.find(([name]) => name === key)?.[1];
     if (key === "logo") throw new Error(`logo: the page cannot read ${string ?? plain}; remove this line, and choose the logo in the form`);

@@ -7,8 +7,11 @@ export const made: { json: string; name: string; family: string | null; isWanted
 /** A processed photograph. */
 export type Shot = { name: string; json: string; corners: number; labelled: boolean };
 
-/** The target searched for, the processed photographs, and the end of all detection requested so far. */
-export const seen: { sought: Sought | null; shots: Shot[]; done: Promise<unknown> } = { sought: null, shots: [], done: Promise.resolve() };
+/**
+ * The target searched for, the default edge that it has until one is entered, the message about an invalid edge, the processed
+ * photographs, and the end of all detection requested so far.
+ */
+export const seen: { sought: Sought | null; assumedEdge: number | null; wrongEdge: string; shots: Shot[]; done: Promise<unknown> } = { sought: null, assumedEdge: null, wrongEdge: "", shots: [], done: Promise.resolve() };
 
 /** The name of a file without its extension, used as the name of its view. */
 export const stem = (name: string) => name.replace(/\.[^.]*$/, "");

@@ -10,6 +10,8 @@ const MAX_IDS = 2 ** 32 - 1;
 // list: papers (written by tests/it/files/lists.rs)
 const papers = ["A0", "A1", "A2", "A3", "A4", "A5", "letter", "legal", "tabloid"];
 // end of list
+/** Whether a text may be a paper: a name, or two lengths such as 297x420mm. */
+export const isPaper = (text: string): boolean => papers.some((paper) => paper.toLowerCase() === text.toLowerCase()) || /^[\d.]+ ?(mm|cm|m|in)? ?[x×] ?[\d.]+ ?(mm|cm|m|in)?$/i.test(text);
 /** Ranges of rows and columns. */
 const SIDES: Record<string, [number, number]> = { charuco: [3, 200], aprilgrid: [2, 100], circles: [2, 200] };
 
@@ -179,7 +181,7 @@ export function targetForm({ changed: report, chooseMesh, chooseLogo }: Given): 
     settings = shown;
     for (const radio of radios) radio.checked = radio.value === settings.kind;
     const isOpen = form.querySelector("details")?.open ?? false;
-    const name = el("input", { type: "text", name: "name", value: settings.name, input: () => changed({ name: name.value }) });
+    const name = el("input", { type: "text", name: "name", required: true, pattern: "[A-Za-z0-9_][A-Za-z0-9_.\\-]{0,63}", title: text.names, value: settings.name, input: () => changed({ name: name.value }) });
     const group = (title: string, fields: HTMLElement[]) => el("fieldset", {}, el("legend", {}, title), ...fields);
     familyChoice = null;
     form.replaceChildren(

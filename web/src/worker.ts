@@ -163,6 +163,7 @@ async function madeOf(settings: string): Promise<{ made: Make.Made; family: stri
   const { Made, family_of_settings } = await maker();
   const family = family_of_settings(settings);
   const file = family === undefined ? ((JSON.parse(settings) as { family_file?: string | null }).family_file ?? undefined) : await fileOf(family);
+  if (family !== undefined && file === undefined) throw new Error(`“${family}” is not a tag family of this page: choose another, or drop its family file (.json)`);
   return { made: new Made(settings, file), family, file };
 }
 

@@ -298,10 +298,16 @@ test.describe("make", () => {
     await choose(page, "Checkerboard");
     await expect(page.getByLabel("Tag family")).toHaveValue("");
     await expect(page.getByLabel("First tag id")).toHaveCount(0);
+    // The reason stays beside the button after another message.
+    await page.getByLabel("Name", { exact: true }).fill("größe");
+    await expect(page.locator(".get .state")).toContainText("Name: enter 1 to 64 letters");
+    await drop(page, [{ name: "logo.png", content: Buffer.from("no logo") }]);
+    await expect(page.getByRole("alert")).toContainText("logo.png: choose a file of type");
+    await expect(page.locator(".get .state")).toContainText("Name: enter 1 to 64 letters");
   });
 
   test("invalid settings in an address fall back to defaults, and the address follows the settings", async ({ page }) => {
-    for (const nonsense of ["kind=foo&orientation=upside&tags_in=purple", "kind=mesh&name=part", "rows=many&colour=red"]) {
+    for (const nonsense of ["kind=foo&orientation=upside&tags_in=purple", "kind=mesh&name=part", "rows=many&colour=red&paper=B9"]) {
       await page.goto("about:blank");
       await page.goto(`/#make?${nonsense}`);
       await expect(page.getByText("110 corners")).toBeVisible({ timeout: 30_000 });
@@ -435,7 +441,7 @@ test.describe("see", () => {
     await expect(page.getByRole("button", { name: /board\.png 108 corners, 12 tags/ })).toBeVisible({ timeout: 30_000 });
     await page.getByLabel("Tile edge, mm").fill("0");
     await page.keyboard.press("Tab");
-    await expect(page.getByRole("alert")).toHaveText("Tile edge, mm: enter a number from 0.1 to 1000.");
+    await expect(page.getByRole("alert")).toHaveText("Tile edge, mm: enter a number from 1 to 1000.");
     await page.getByLabel("Tile edge, mm").fill("24.5");
     await page.keyboard.press("Tab");
     await expect(page.getByRole("alert")).toBeHidden();
@@ -444,7 +450,7 @@ test.describe("see", () => {
     await page.getByRole("button", { name: "Remove all" }).click();
     await page.getByRole("button", { name: "Use the sample photograph" }).click();
     await expect(page.getByText("under CC BY 4.0")).toBeVisible({ timeout: 60_000 });
-    await expect(page.getByRole("button", { name: /robot-hand\.png 110 corners/ })).toBeVisible({ timeout: 60_000 });
+    await expect(page.getByRole("button", { name: /robot-hand\.png 110 corners, 0 tags; target not identified/ })).toBeVisible({ timeout: 60_000 });
     await screen(page, "see-sample");
     await page.getByRole("button", { name: "Remove all" }).click();
     await chooseFiles(page, [join(folder, "solid.png")]);
@@ -467,7 +473,7 @@ test.describe("see", () => {
       { name: "text.tif", mimeType: "image/tiff", buffer: Buffer.from("II*\0 this is no picture at all") },
     ];
     await chooseFiles(page, files);
-    for (const { name } of files) await expect(page.getByRole("button", { name: new RegExp(name.replace(".", "\\.")) })).toContainText(/not|damaged|cannot|empty|more than|exceeds|too large|invalid/i, { timeout: 30_000 });
+    for (const { name } of files) await expect(page.getByRole("button", { name: new RegExp(name.replace(".", "\\.")) })).toContainText(/damaged, or not an image of a supported type: copy it again, or convert it to JPEG|empty file/, { timeout: 30_000 });
     await screen(page, "see-hostile");
     await chooseFiles(page, [{ name: "broken.json", mimeType: "application/json", buffer: Buffer.from('{"schema": "deltille/target/1"') }]);
     await expect(page.getByRole("button", { name: /cut\.png/ })).toContainText(/\w+ \w+/, { timeout: 30_000 });
@@ -542,6 +548,9 @@ test.describe("calibrate", () => {
     await page.getByLabel("Print scale").fill("269.3/270, 3");
     await page.keyboard.press("Tab");
     await expect(page.getByRole("alert")).toContainText("Print scale: 269.3/270, 3 is not a ratio from 0.5 to 2");
+    await page.getByLabel("Print scale").fill("2");
+    await page.keyboard.press("Tab");
+    await expect(page.getByRole("status")).toContainText("Print scale: printers change lengths by less than 5 %");
     await page.getByLabel("Print scale").fill("269.325/270, 0.9985");
     await page.getByRole("button", { name: "Calibrate", exact: true }).click();
     await expect(page.getByText(/Reprojection error: 0\.0\d+ px/)).toBeVisible({ timeout: 60_000 });
@@ -589,6 +598,34 @@ test.describe("calibrate", () => {
     }
   });
 
+  test("an edge that was not measured is stated, and an invalid one is refused", async ({ page }) => {
+    await page.goto("/#see");
+    await chooseFiles(page, [0, 1, 2, 3, 4].map((i) => join(folder, `${i}.png`)));
+    await expect(page.getByLabel("Tile edge, mm")).toHaveAttribute("placeholder", "20 (default, not measured)", { timeout: 60_000 });
+    await page.getByRole("link", { name: "Calibrate", exact: true }).click();
+    const calibrate = page.getByRole("button", { name: "Calibrate", exact: true });
+    await calibrate.click();
+    const assumed = page.getByText("Distances assume an edge of 20 mm, which was not measured");
+    await expect(assumed).toBeVisible({ timeout: 60_000 });
+    for (const [edge, said] of [["0", "Tile edge, mm: enter a number from 1 to 1000."], ["1000", "larger than 5 m"]] as const) {
+      await page.getByRole("link", { name: "Detect", exact: true }).click();
+      await page.getByLabel("Tile edge, mm").fill(edge);
+      await page.keyboard.press("Tab");
+      await expect(page.getByRole("alert")).toContainText(said);
+      await page.getByRole("link", { name: "Calibrate", exact: true }).click();
+      await calibrate.click();
+      await expect(page.getByRole("alert")).toContainText("The tile edge in “Detect” is not valid");
+      await expect(page.getByText("Reprojection error")).toBeHidden();
+    }
+    await page.getByRole("link", { name: "Detect", exact: true }).click();
+    await page.getByLabel("Tile edge, mm").fill("24.5");
+    await page.keyboard.press("Tab");
+    await page.getByRole("link", { name: "Calibrate", exact: true }).click();
+    await calibrate.click();
+    await expect(page.getByText("Reprojection error")).toBeVisible({ timeout: 60_000 });
+    await expect(assumed).toBeHidden();
+  });
+
   test("missing inputs are reported", async ({ page }) => {
     await page.goto("/#calibrate");
     await page.getByRole("button", { name: "Calibrate", exact: true }).click();
@@ -612,7 +649,7 @@ test.describe("calibrate", () => {
     await screen(page, "calibrate-guided");
     const wish = page.locator(".wish");
     const before = await wish.textContent();
-    await page.getByRole("button", { name: "Skip this pose" }).click();
+    await page.getByRole("button", { name: "Another pose" }).click();
     await expect(wish).not.toHaveText(before ?? "");
     // Manual captures count, too; once there is a calibration, its uncertainty is shown.
     for (let taken = 2; taken <= 7; taken++) {
