@@ -152,7 +152,7 @@ export function calibrate(): HTMLElement {
       result.replaceChildren(el("p", { class: "busy" }, words.calibrate.solving));
       solvedOf = asked();
       tally();
-      show(await looking.call("calibrate", target(), all.map(({ json }) => json), all.map(({ name }) => stem(name)), model, printScale(scale.value)));
+      show(await looking.call("calibrate", target(), all.map(({ json }) => json), all.map(({ name }) => stem(name)), model, printScale(scale.value) ?? (seen.measuredEdge ? [1, 1] : null)));
       result.scrollIntoView({ block: "nearest" });
     } catch (error) {
       solvedOf = [];

@@ -266,7 +266,7 @@ export function make(): HTMLElement {
 
   function showFacts(drawn: Pages): void {
     const { reach, family } = drawn;
-    facts.textContent = text.facts(reach.corners, reach.tags);
+    facts.textContent = settings.kind === "circles" ? text.circles(reach.corners) : text.facts(reach.corners, reach.tags);
     if (reach.tags > 0 && family && family !== PLACES) facts.textContent += ` ${text.idsLeft(reach.ids_left, family)}`;
     showSheets(drawn);
     void showRange();
@@ -295,7 +295,7 @@ export function make(): HTMLElement {
   /** Shows the working range of a camera, as computed by the library. */
   async function showRange(): Promise<void> {
     const mistake = mistaken([view, pixels]);
-    if (mistake || !pages) {
+    if (mistake || !pages || settings.kind === "circles") {
       range.textContent = mistake && pages ? mistake : "";
       return;
     }

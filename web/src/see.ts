@@ -138,6 +138,7 @@ export function see(): HTMLElement {
     choice = value;
     recognised = null;
     seen.assumedEdge = null;
+    seen.measuredEdge = false;
     seen.wrongEdge = "";
     known.replaceChildren();
     if (value === "auto") sought = null;
@@ -284,6 +285,7 @@ export function see(): HTMLElement {
   function showTarget(found: Recognised): void {
     const spec = found.spec as BoardSpec;
     seen.assumedEdge = spec.edge_mm;
+    seen.measuredEdge = false;
     if (spec.kind !== "board") {
       const shape = String((found.spec as { shape?: unknown }).shape ?? "");
       known.replaceChildren(el("p", { class: "good" }, words.see.recognisedSolid(shape, found.tags)), el("p", { class: "facts" }, words.see.assumedSolid(spec.edge_mm)));
@@ -315,6 +317,7 @@ export function see(): HTMLElement {
     if (!check(edge, wrong)) return;
     const edge_mm = edge.value === "" ? spec.edge_mm : Number(edge.value);
     seen.assumedEdge = edge.value === "" ? spec.edge_mm : null;
+    seen.measuredEdge = edge.value !== "";
     const { family, first_id, spacing, border_bits, tags_in } = spec.tags;
     const { rows, cols, inverted, grid = "deltille" } = spec;
     try {

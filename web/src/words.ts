@@ -19,7 +19,7 @@ export const words = {
   failed: "The library crashed and was restarted. Try again with other settings, or report what you did.",
   make: {
     title: "Make a target",
-    lead: "Choose a pattern. The files are those of the command-line program, byte for byte.",
+    lead: "Choose a pattern. The files are ready to print, and verified by reading them back.",
     kind: "Target",
     kinds: {
       deltille: "Deltille board",
@@ -114,6 +114,7 @@ export const words = {
     fitsOnA4: (pages: number) => `; fits on A4 in ${pages} ${pages === 1 ? "page" : "pages"}`,
     useA4: "Print on A4",
     facts: (corners: number, tags: number) => `${corners} corners, ${tagCount(tags)}.`,
+    circles: (count: number) => `${count} circles. Detect them with OpenCV (findCirclesGrid): this page and the deltille program do not.`,
     idsLeft: (left: number, family: string) => (left > 0 ? `${left} ids of ${family} remain for other targets.` : `No id of ${family} remains for other targets.`),
     range: (near: string, far: string, hasTags: boolean) =>
       `Working range of your camera: ${near}, where the target fills the image, to ${far}, where ${hasTags ? "a tag cell" : "a tile"} is just large enough.`,
@@ -248,7 +249,7 @@ export const words = {
     solving: "Calibrating…",
     outdated: "The images, the model or the print scale changed after this calibration: calibrate again.",
     rms: (rms: string, views: number) => `Reprojection error: ${rms} px RMS per axis over ${views} views.`,
-    sure: (px: string) => `Projection uncertainty of distant points: ${px} px (1σ).`,
+    sure: (px: string) => `Projection uncertainty of distant points: ${px} px (1σ), from the scatter between views and the accuracy of the board.`,
     parameter: "Parameter",
     value: "Value",
     deviation: "1σ",

@@ -61,10 +61,7 @@ fn a_new_folder_with_the_name_of_a_file_is_refused() {
         "rectify r.json --pair a,b -o out.yaml",
         "-o: out.yaml looks like a file, but a folder is needed",
     );
-    refused(
-        "detect --target b.json b.json b.json -o out.csv",
-        "must be a folder, because several",
-    );
+    refused("detect --target b.json b.json b.json -o out.csv", "must be a folder, because several");
     refused("board --rows 4 --cols 5 --name c -o d.pdf", "--name: -o already names the files d");
     refused("undistort --camera c.yaml -o /dev/full", "-o /dev/full");
     let pose = "pose none.png --target b.json --camera c.yaml -o /dev/full";

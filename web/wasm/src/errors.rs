@@ -19,10 +19,13 @@ pub fn one_line(message: &impl Display) -> String {
 pub fn name(setting: Setting) -> String {
     let key = match setting {
         Setting::CalibrateModel => return "the camera model".to_owned(),
-        Setting::CalibrationBoardShape => return "`deltille calibrate --board-shape`".to_owned(),
-        Setting::CalibrationMeasureTarget => {
-            return "`deltille calibrate --measure-target`".to_owned();
+        Setting::CalibrationBoardShape => {
+            return "`--board-shape` of the deltille program".to_owned();
         }
+        Setting::CalibrationMeasureTarget => {
+            return "`--measure-target` of the deltille program".to_owned();
+        }
+        Setting::FamilyToJson => return "the deltag program".to_owned(),
         Setting::PrintScale => return "the print scale".to_owned(),
         Setting::AprilGridTagMm | Setting::CharucoSquareMm | Setting::CirclesSpacingMm => "edge_mm",
         Setting::AprilGridTags | Setting::CharucoSquares | Setting::CirclesCircles => "rows",

@@ -265,8 +265,8 @@ impl Wanted {
         };
         let usual = SolidSpec::new(shape);
         if usual.square_tags.is_some() {
-            let what = "this mesh mixes rectangular and other faces, which need two tag families: use \
-                        `deltille solid --mesh` instead";
+            let what = "this mesh mixes rectangular and other faces, which need two tag families: the deltille \
+                        program can make it";
             return Err(JsError::new(what));
         }
         let mut spec = SolidSpec {

@@ -195,8 +195,8 @@ impl fmt::Display for Reason {
             ReasonKind::OtherTiling => {
                 write!(
                     f,
-                    "found {} of the other tiling: check whether the target has triangles or \
-                     squares",
+                    "found {} of squares where triangles are expected, or the reverse: check the kind of the \
+                     target",
                     count("corners", "corner")
                 )
             }

@@ -355,10 +355,10 @@ fn coverage(
     if reach < REACH {
         let (place, length) = match survey.circle {
             Some(_) => ("near the edge of the image circle", "radius"),
-            None => ("in the corners of the image", "half diagonal"),
+            None => ("near the four corners of the image", "half diagonal"),
         };
         let text = format!(
-            "No corner was seen {place}: distortion is extrapolated beyond {:.0} % of the {length}.",
+            "No corner of the target was seen {place}: distortion is extrapolated beyond {:.0} % of the {length}.",
             100.0 * reach
         );
         add(Weight::Hint, text);
@@ -462,6 +462,7 @@ mod tests {
     use deltille_calibrate::Matrix;
 
     use super::*;
+    use crate::report::measures::survey::SurveyedView;
     use deltille_calibrate::{Estimate, LackOfFit, Model, PanelPrior};
     use deltille_core::camera::{Camera, Pose};
 
@@ -484,6 +485,27 @@ mod tests {
         let report = Report::new("camera", &estimate);
         let advice = advice(&report, &surveys);
         advice.into_iter().map(|advice| advice.text + "\n").collect()
+    }
+
+    #[test]
+    fn tilts_about_one_axis_are_not_enough() {
+        use std::f64::consts::{FRAC_PI_2, PI};
+        let estimate = estimate(1, 1);
+        let is_one_axis = |directions: &[f64]| {
+            let mut survey = Survey::new(&estimate.cameras[0]);
+            survey.planar = true;
+            let view = |&direction| SurveyedView {
+                tilt_rad: Some(0.6),
+                tilt_direction_rad: Some(direction),
+                distance_mm: 500.0,
+            };
+            survey.views = directions.iter().map(view).collect();
+            let advice = advice(&Report::new("camera", &estimate), &[survey]);
+            advice.iter().any(|piece| piece.text.contains("about the same axis"))
+        };
+        assert!(is_one_axis(&[0.0, 0.1, PI, PI - 0.1, -0.1]));
+        assert!(!is_one_axis(&[0.0, FRAC_PI_2, PI, -FRAC_PI_2]));
+        assert!(!is_one_axis(&[0.0, 0.0, 0.0, FRAC_PI_2]));
     }
 
     /// An estimate with the given numbers of cameras and panels, without views.

@@ -189,7 +189,8 @@ fn calibrated_with(report: &Report) -> String {
     if targets.is_empty() {
         return String::new();
     }
-    let scale = report.print.scale.map_or(String::new(), |[across, up]| {
+    let scale = report.print.scale.filter(|scale| *scale != [1.0; 2]);
+    let scale = scale.map_or(String::new(), |[across, up]| {
         format!("; measured lengths of the print: {across:.5} across and {up:.5} up, times the nominal ones")
     });
     format!("<p class=\"note\">Calibrated with {}{scale}.</p>", escaped(&targets.join(", ")))

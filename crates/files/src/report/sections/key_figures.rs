@@ -113,9 +113,10 @@ pub(in crate::report) fn of_rig(report: &Report) -> Vec<Figure> {
     cells
 }
 
-/// The ink spread of the print, if it was measured together with its standard deviation.
+/// The ink spread of the print, if it was measured and is significant.
 fn of_print(report: &Report) -> Option<Figure> {
-    let (um, deviation) = report.print.ink.and_then(|ink| ink.um.zip(ink.um_sd))?;
+    let measured = report.print.ink.and_then(|ink| ink.um.zip(ink.um_sd));
+    let (um, deviation) = measured.filter(|(um, sd)| um.abs() > 2.0 * sd)?;
     let (um, deviation) = rounded(um, Some(deviation));
     Some((format!("{um} ± {deviation} µm"), "ink spread".into()))
 }
