@@ -62,7 +62,7 @@ pub struct ListVerdict {
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct CutVerdict {
-    /// Width and height of the drawing, mm.
+    /// Width and height of the drawing, or of a plate that is cut with it, mm.
     pub size_mm: [f64; 2],
     /// Outlines found at their positions.
     pub outlines: usize,

@@ -276,7 +276,7 @@ impl fmt::Display for Missing {
                     None => write!(
                         to,
                         "the calibration itself is too uncertain; calibrate again with more views, and measure the target \
-                         ({CalibrationMeasureTarget}) or state the accuracy of the board"
+                         ({CalibrationMeasureTarget}) or state the accuracy of the board there"
                     ),
                 }
             }

@@ -53,7 +53,10 @@ const MAX_DEPTH: usize = 16;
 #[non_exhaustive]
 pub enum CameraFileError {
     /// The text is not YAML, or does not have these keys.
-    #[error("not a camera file: {0}; use the .yaml that {CalibrationWrite} wrote")]
+    #[error(
+        "not a camera file: {0}; use the .yaml that {CalibrationWrite} wrote, or a YAML file of ROS or OpenCV with \
+             image_width, image_height, camera_matrix and distortion_coefficients"
+    )]
     Yaml(String),
     /// The value of a key is invalid.
     #[error("key `{key}`: {problem}")]

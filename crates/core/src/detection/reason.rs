@@ -159,7 +159,7 @@ impl fmt::Display for Reason {
         if let Some(settings) = &self.fits {
             return write!(
                 f,
-                "the tags fit a board with {settings}; make the target file accordingly"
+                "the tags fit a board with {settings}; it is another board, or the target file is wrong"
             );
         }
         match self.kind {

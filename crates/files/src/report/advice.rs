@@ -143,6 +143,17 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
 }
 
 impl Report<'_> {
+    /// Returns the warnings about the number of views and their tilts, which are no diagnoses of the solution.
+    pub fn view_warnings(&self) -> Vec<String> {
+        let of_camera = |camera: &CameraEstimate| {
+            let found = number_and_tilts(self, camera, &Survey::new(camera)).into_iter();
+            let warnings = found.filter(|piece| piece.weight == Weight::Warning);
+            warnings.map(|piece| of_camera(self, camera, piece.text)).collect::<Vec<_>>()
+        };
+        let estimated = self.estimate.cameras.iter().filter(|camera| camera.model.is_some());
+        estimated.flat_map(of_camera).collect()
+    }
+
     /// Returns what to improve, the most important first: the warnings and hints of the page.
     pub fn remedies(&self) -> Vec<String> {
         let surveys: Vec<Survey> = self.estimate.cameras.iter().map(Survey::new).collect();
@@ -201,13 +212,10 @@ fn add_diagnoses(report: &Report, add: &mut impl FnMut(Weight, String), topic: T
     }
 }
 
-fn views(
-    report: &Report,
-    index: usize,
-    camera: &CameraEstimate,
-    survey: &Survey,
-    add: &mut impl FnMut(Weight, String),
-) {
+/// Advice on the number of views, and on the tilts of a planar target in them.
+fn number_and_tilts(report: &Report, camera: &CameraEstimate, survey: &Survey) -> Vec<Advice> {
+    let mut found = Vec::new();
+    let mut add = |weight, text| found.push(Advice { weight, text });
     let count = camera.views.len();
     if count < VIEWS {
         add(
@@ -226,17 +234,22 @@ fn views(
             add(
                 Weight::Warning,
                 format!(
-                    "Only {tilted} of {count} views are tilted by more than 20°, so focal length and distance are \
-                     hard to separate. Tilt the {} by 30° to 50° in all four directions.",
+                    "Only {} tilted by more than 20°, so focal length and distance are hard to separate. Tilt the {} by \
+                     30° to 50° in all four directions.",
+                    if tilted == 1 {
+                        "1 view is".to_owned()
+                    } else {
+                        format!("{tilted} views are")
+                    },
                     report.target_noun()
                 ),
             );
         } else if across < ACROSS {
             add(
-                Weight::Hint,
+                Weight::Warning,
                 format!(
-                    "{tilted} of {count} views are tilted by more than 20°, but all about the same axis of the image: also \
-                     tilt the {}, or turn the camera by 90°, about the other one.",
+                    "{tilted} of {count} views are tilted by more than 20°, but all about the same axis of the image, so \
+                     focal length and principal point are uncertain: also tilt the {}, or turn the camera by 90°, about the other one.",
                     report.target_noun()
                 ),
             );
@@ -245,6 +258,19 @@ fn views(
                 format!("{tilted} of {count} views are tilted by more than 20°, about both axes.");
             add(Weight::Good, text);
         }
+    }
+    found
+}
+
+fn views(
+    report: &Report,
+    index: usize,
+    camera: &CameraEstimate,
+    survey: &Survey,
+    add: &mut impl FnMut(Weight, String),
+) {
+    for Advice { weight, text } in number_and_tilts(report, camera, survey) {
+        add(weight, text);
     }
     left_out(report, add, |out| match &out.camera {
         Some(name) => *name == camera.name,

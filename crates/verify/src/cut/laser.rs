@@ -85,6 +85,7 @@ pub(crate) fn verify(
     cut.kerf_mm = Some(kerf_mm);
     let found = if format == Format::Svg { moved(found, &stated) } else { found };
     let mut findings = outlines::compare(found.clone(), stated, &mut cut);
+    cut.size_mm = cut.size_mm.map(|mm| mm - kerf_mm);
     // Render the drawing only if its outlines are at their positions, so that it is small enough.
     if format == Format::Svg && findings.is_empty() {
         findings = differs_when_rendered(reader, path, &found)?;

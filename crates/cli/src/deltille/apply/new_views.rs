@@ -68,7 +68,7 @@ pub struct NewViewsArgs {
     family: Option<String>,
     /// Standard deviation of the board's corners from their described positions, such as 0.05mm; 0 for an exact board
     /// [default: that of a measured target, otherwise 0.1 mm, at most 0.5 % of an edge]
-    #[arg(long, value_name = "LENGTH", value_parser = accuracy)]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, value_parser = accuracy)]
     board_accuracy: Option<f64>,
     #[command(flatten)]
     limits: ImageLimits,

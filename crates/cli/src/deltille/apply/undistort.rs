@@ -39,7 +39,7 @@ struct ViewArgs {
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
     /// Object distance for which the mapping is exact (model pupil only), such as 2m [default: infinity]
-    #[arg(long, value_name = "LENGTH", value_parser = distance)]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, value_parser = distance)]
     distance: Option<f64>,
     /// Also write the remap tables for OpenCV's remap, as float32 arrays for NumPy
     #[arg(long)]
@@ -168,6 +168,11 @@ pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
         file.is_none() || images.is_one_photograph(),
         "-o: {} is one file, but there is not exactly one photograph; use a folder",
         args.view.output.display()
+    );
+    ensure!(
+        !args.images.iter().any(|path| path.is_dir() && same_file(path, &folder)),
+        "-o: {} is the folder of the photographs, and would mix them with the results; use another folder",
+        folder.display()
     );
     let stem_of_one = file.map(|file| file.stem);
     args.view.output = folder;

@@ -32,7 +32,7 @@ pub struct Args {
     #[arg(value_name = "SECOND")]
     second: PathBuf,
     /// Distance of the points at which cameras are compared, such as 2m [default: infinity]
-    #[arg(long, value_name = "LENGTH", value_parser = distance)]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, value_parser = distance)]
     distance: Option<f64>,
     /// Image region to compare: seen (where both calibrations have corners), image (the whole image), or pixels
     /// LEFT,TOP,RIGHT,BOTTOM

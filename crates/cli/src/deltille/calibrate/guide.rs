@@ -60,10 +60,10 @@ pub struct Args {
     board_shape: bool,
     /// Shortest distance at which the board is in focus, such as 30cm [default: 10 % less than that of any corner so
     /// far]
-    #[arg(long, value_name = "LENGTH", value_parser = distance)]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, value_parser = distance)]
     nearest: Option<f64>,
     /// Farthest distance, such as 2m [default: 10 % more than that of any corner so far]
-    #[arg(long, value_name = "LENGTH", value_parser = distance)]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, value_parser = distance)]
     farthest: Option<f64>,
     /// Stop at this projection uncertainty over the whole image, px [default: when the next view would lower the
     /// uncertainty by less than 3 %]

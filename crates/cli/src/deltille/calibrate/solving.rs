@@ -27,7 +27,7 @@ use deltille::export::calibration::{Print, Residuals};
 use deltille::export::camera::FormatError;
 use deltille::layout::Printing;
 use deltille::raster::CameraNotes;
-use deltille::report::{camera_notes, target_map_svg};
+use deltille::report::{Report, camera_notes, target_map_svg};
 use deltille::targets::{self, parse_length_mm};
 use deltille_core::quantity::board_accuracy_mm;
 use deltille_core::words::counted;
@@ -58,11 +58,11 @@ pub struct SolveArgs {
     /// Standard uncertainty per axis of the corner positions in the description, such as 0.05mm, or 0 for an exact
     /// board. It contributes to the standard deviations reported as observed [default: that of a
     /// measured target, otherwise 0.1 mm, at most 0.5 % of an edge]
-    #[arg(long, value_name = "LENGTH", value_parser = accuracy)]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, value_parser = accuracy)]
     board_accuracy: Option<f64>,
     /// Distances at which to report the projection uncertainty in addition to infinity, such as 2m, separated by
     /// commas [default: the median distance of the corners]
-    #[arg(long, value_name = "LENGTH", value_delimiter = ',', value_parser = distance)]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, value_delimiter = ',', value_parser = distance)]
     uncertainty_at: Vec<f64>,
     /// Include every corner with its residual in the .json (150 bytes each)
     #[arg(long)]
@@ -327,6 +327,9 @@ impl Calibrated {
             bail!("{}; nothing was written", words.sentence(foreign));
         }
         print_diagnoses(&words, &self.diagnoses);
+        for text in Report::new("", &self.estimate).view_warnings() {
+            log!("warning: {text}");
+        }
         Ok(())
     }
 

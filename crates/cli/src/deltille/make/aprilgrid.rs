@@ -20,7 +20,7 @@ pub struct Args {
     #[arg(long, value_name = "COLUMNSxROWS")]
     tags: Grid,
     /// Side length of a tag including its black border (Kalibr's tagSize), such as 25mm, 8.8cm, 1in
-    #[arg(long, value_name = "LENGTH", default_value = "25mm", value_parser = parse_length_mm)]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, default_value = "25mm", value_parser = parse_length_mm)]
     edge: f64,
     /// Gap between tags as a fraction of the tag's side, 0.1 to 0.9 (Kalibr's tagSpacing)
     #[arg(long, value_name = "FRACTION", default_value_t = 0.3, value_parser = number(0.1..=0.9))]

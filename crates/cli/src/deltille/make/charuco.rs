@@ -16,10 +16,10 @@ pub struct Args {
     #[arg(long, value_name = "COLUMNSxROWS")]
     squares: Grid,
     /// Edge length of a square, such as 30mm, 3cm, 1.2in
-    #[arg(long, value_name = "LENGTH", default_value = "30mm", value_parser = parse_length_mm)]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, default_value = "30mm", value_parser = parse_length_mm)]
     edge: f64,
     /// Side length of a marker including its black border [default: three quarters of the square]
-    #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm)]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, value_parser = parse_length_mm)]
     marker: Option<f64>,
     /// OpenCV dictionary: 4x4, 5x5, 6x6 or 7x7 with _50, _100, _250 or _1000; apriltag_16h5, apriltag_25h9 or
     /// apriltag_36h11

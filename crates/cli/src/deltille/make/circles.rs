@@ -16,10 +16,10 @@ pub struct Args {
     asymmetric: bool,
     /// Distance between rows. The spacing of circles in a row is the same, or twice this in an
     /// asymmetric grid
-    #[arg(long, value_name = "LENGTH", default_value = "20mm", value_parser = parse_length_mm)]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, default_value = "20mm", value_parser = parse_length_mm)]
     spacing: f64,
     /// Diameter of a circle [default: half the spacing]
-    #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm)]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, value_parser = parse_length_mm)]
     diameter: Option<f64>,
     /// Id of the board
     #[arg(long, value_name = "ID", default_value_t = 0,

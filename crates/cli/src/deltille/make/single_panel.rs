@@ -32,7 +32,7 @@ pub struct PrintingArgs {
     #[arg(long, help_heading = PAPER)]
     guide_page: bool,
     /// Blank margin along the edges of the paper; at least 0.5 mm are kept blank [default: 5mm]
-    #[arg(long, help_heading = PAPER, value_name = "LENGTH", value_parser = parse_length_mm)]
+    #[arg(long, help_heading = PAPER, value_name = "LENGTH", allow_hyphen_values = true, value_parser = parse_length_mm)]
     margin: Option<f64>,
     /// Write <name>.pdf (default unless --svg or --png is given)
     #[arg(long, help_heading = PRINT)]
@@ -53,7 +53,7 @@ pub struct PrintingArgs {
     #[arg(long, help_heading = PAPER, value_name = "FILE")]
     logo: Option<PathBuf>,
     /// Height of the logo [default: the height of the label strip]
-    #[arg(long, help_heading = PAPER, value_name = "LENGTH", value_parser = parse_length_mm)]
+    #[arg(long, help_heading = PAPER, value_name = "LENGTH", allow_hyphen_values = true, value_parser = parse_length_mm)]
     logo_height: Option<f64>,
     /// Stem of the file names, also printed on the sheet [default: the name of the command]
     #[arg(long, help_heading = OUTPUT, value_parser = name)]

@@ -226,7 +226,7 @@ impl Meshes {
             let edge = edge_of(target)
                 .map_or(String::new(), |mm| format!("; --edge {}mm fits", (mm * scale).floor()));
             log!(
-                "warning: --3mf: {:.0} × {:.0} mm do not fit on a bed of {} × {} mm (--bed){edge}",
+                "warning: --3mf: {:.1} × {:.1} mm do not fit on a bed of {} × {} mm (--bed){edge}",
                 size.x,
                 size.y,
                 bed[0],
