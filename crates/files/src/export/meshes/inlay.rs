@@ -95,7 +95,8 @@ impl InlaidBodies {
     }
 
     /// Returns width, depth and height, mm, of the bodies with a board on the bed of a printer, and the scale at which
-    /// they just fit on a bed of this width and depth. Of all boards and rotations on the bed, those are used that fit best.
+    /// they just fit on a bed of this width and depth. Of all boards, and of all
+    /// rotations with a side along the bed, those are used that fit best; other rotations if none of these fits.
     pub fn on_bed(&self, [width_mm, depth_mm]: [f64; 2]) -> (DVec3, f64) {
         let mut best = (DVec3::ZERO, 0.0);
         for &front in &self.fronts {
@@ -109,15 +110,16 @@ impl InlaidBodies {
             );
             let sides = (0..footprint.len())
                 .map(|i| footprint[(i + 1) % footprint.len()] - footprint[i])
-                .map(|side| DVec2::new(side.x, -side.y).normalize_or(DVec2::X));
-            let steps = (0..90).map(|degrees| DVec2::from_angle(f64::from(degrees).to_radians()));
-            for along in sides.chain(steps) {
+                .map(|side| (true, DVec2::new(side.x, -side.y).normalize_or(DVec2::X)));
+            let steps = (0..90).map(|degrees| f64::from(degrees).to_radians());
+            let steps = steps.map(|angle| (false, DVec2::from_angle(angle)));
+            for (is_side, along) in sides.chain(steps) {
                 let turned: Vec<DVec2> = footprint.iter().map(|at| along.rotate(*at)).collect();
                 let least = turned.iter().copied().fold(DVec2::INFINITY, DVec2::min);
                 let size = turned.iter().copied().fold(DVec2::NEG_INFINITY, DVec2::max) - least;
                 for size in [size, size.yx()] {
                     let scale = (width_mm / size.x).min(depth_mm / size.y);
-                    if scale > best.1 {
+                    if scale > best.1 && (is_side || best.1 < 1.0) {
                         best = (size.extend(high - low), scale);
                     }
                 }
