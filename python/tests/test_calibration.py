@@ -9,7 +9,7 @@ import pytest
 import deltille
 
 
-def test_a_camera_is_calibrated_with_its_uncertainties(calibration, camera, detections):
+def test_a_camera_is_calibrated_with_its_uncertainties(calibration, board, camera, detections):
     assert calibration.model == "radtan" and calibration.camera.model == "pinhole"
     found = calibration.camera.parameters
     names = calibration.camera.parameter_names
@@ -34,6 +34,8 @@ def test_a_camera_is_calibrated_with_its_uncertainties(calibration, camera, dete
     assert calibration.uncertainty_map().shape == (18, 24)
     assert calibration.projection_covariance([[640, 480]]).shape == (1, 2, 2)
     assert calibration.excluded == [] and all(said.sentence for said in calibration.diagnoses)
+    few = deltille.calibrate(detections[:5], board, model="radtan")
+    assert any(remedy.startswith("Only 5 views") for remedy in few.remedies())
 
 
 def test_the_covariance_of_all_unknowns_has_their_names(detections, board, calibration):

@@ -10,7 +10,6 @@ use deltille::export::named::named;
 use deltille::export::{Placed, RIG_FORMATS, saved};
 use deltille::layout::Printing;
 use deltille::limits::Limits;
-use deltille::report;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
@@ -185,23 +184,22 @@ macro_rules! whole {
                 overwrite: bool,
             ) -> PyResult<PathBuf> {
                 let solved = $solved.clone();
-                if !solved.is_whole() {
-                    let what = "this calibration lacks data for a report: write the report directly after \
-                                calibrating; if there are no diagnoses, you can instead save with \
-                                residuals=True and load with the target";
-                    return Err(errors::calibration(what.to_owned()));
-                }
+                solved.check_whole()?;
                 let usual = if $is_rig { "rig" } else { "camera" };
                 let title = title.unwrap_or(usual).to_owned();
-                let page = unlocked(py, move || {
-                    let mut page = report::Report::new(&title, &solved.estimate);
-                    page.poses = &solved.poses;
-                    (page.diagnoses, page.stated) = (&solved.diagnoses, &solved.stated);
-                    (page.print, page.models) = (solved.print, &solved.models);
-                    page.notes = solved.notes.clone();
-                    page.html()
-                })?;
+                let page = unlocked(py, move || solved.page(&title).html())?;
                 save_text(path, page, overwrite)
+            }
+
+            /// Returns what to improve, the most important first: the warnings and hints of :meth:`report`.
+            ///
+            /// Returns
+            /// -------
+            /// list of str
+            fn remedies($self: $kind, py: Python<'_>) -> PyResult<Vec<String>> {
+                let solved = $solved.clone();
+                solved.check_whole()?;
+                unlocked(py, move || solved.page("").remedies())
             }
         }
     };

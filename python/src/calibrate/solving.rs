@@ -14,7 +14,7 @@ use deltille::export::sheet::Sheet;
 use deltille::export::{calibration, rig};
 use deltille::layout::Printing;
 use deltille::raster::CameraNotes;
-use deltille::report::camera_notes;
+use deltille::report::{Report, camera_notes};
 use deltille::{camera, detect, targets};
 use deltille_core::quantity::{board_accuracy_mm, distance_mm, edge_mm, print_scale};
 use pyo3::prelude::*;
@@ -379,6 +379,26 @@ impl Solved {
             whole
         };
         content(self) == content(other)
+    }
+
+    /// Fails if the result, read from a file, lacks what a report shows.
+    pub fn check_whole(&self) -> PyResult<()> {
+        if self.is_whole() {
+            return Ok(());
+        }
+        let what = "this calibration lacks data for a report: write the report directly after calibrating; if there are \
+                    no diagnoses, you can instead save with residuals=True and load with the target";
+        Err(errors::calibration(what.to_owned()))
+    }
+
+    /// Returns the report.
+    pub fn page<'a>(&'a self, title: &'a str) -> Report<'a> {
+        let mut page = Report::new(title, &self.estimate);
+        page.poses = &self.poses;
+        (page.diagnoses, page.stated) = (&self.diagnoses, &self.stated);
+        (page.print, page.models) = (self.print, &self.models);
+        page.notes = self.notes.clone();
+        page
     }
 
     /// Returns the diagnoses as plain data with a sentence each, and whether each is a failure.
