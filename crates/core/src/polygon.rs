@@ -21,6 +21,14 @@ pub fn rectangle([left, lower, right, upper]: [f64; 4]) -> [DVec2; 4] {
     [(left, lower), (right, lower), (right, upper), (left, upper)].map(DVec2::from)
 }
 
+/// Returns the left, lower, right and upper end of a set of points.
+pub fn bounds<'a>(points: impl IntoIterator<Item = &'a DVec2>) -> [f64; 4] {
+    let start = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    let (least, most) =
+        points.into_iter().fold(start, |(least, most), &p| (least.min(p), most.max(p)));
+    [least.x, least.y, most.x, most.y]
+}
+
 /// Computes the convex hull, counterclockwise with y up (Andrew's monotone chain). Returns fewer than three points
 /// unchanged.
 pub fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {

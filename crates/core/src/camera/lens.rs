@@ -10,9 +10,9 @@ use crate::quantity::Range;
 /// Largest number of parameters of a lens whose parameters all affect every point; those of a spline act locally.
 pub const MAX_LENS_PARAMETERS: usize = 12;
 
-/// Defines the enum of lenses. Each line contains a type, the name of the model in camera files,
-/// names of models that a file may contain instead, the name in messages, and a start value. The start value depends on the number of coefficients
-/// and an optional grid.
+/// Defines the enum of lenses. Each line contains a type, the name of the model in camera files, names of models that a
+/// file may contain instead, the name in messages, and a start value. The start value depends on the number of
+/// coefficients and an optional grid.
 macro_rules! lenses {
     ($($(#[$doc:meta])* $lens:ident $name:literal [$($alias:literal)*] $title:literal $given:pat => $start:expr,)*) => {
         /// Projection from the camera frame to the normalised image plane.

@@ -13,11 +13,11 @@ use glam::DVec2;
 
 use super::arrangement::{Arrangement, Footprint, fit_upright};
 use super::margin_marks::ADVANCE_CAPS;
-use super::net::plane::{Motion, bounds, gap_mm};
+use super::net::plane::{Motion, gap_mm};
 use crate::paper::{Orientation, PaperSize, PaperSpec};
 use crate::{Label, LineKind, SheetLayout, SheetLine, SheetPage, SheetText};
 use deltille_core::angles::direction;
-use deltille_core::polygon::rectangle;
+use deltille_core::polygon::{bounds, rectangle};
 use deltille_core::setting::Setting;
 use deltille_core::targets::TargetError;
 

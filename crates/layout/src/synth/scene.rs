@@ -6,9 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::Surface;
 use super::occlusion::Shadow;
-use crate::placing::net::plane::bounds;
 use deltille_core::camera::{Camera, Pose};
-use deltille_core::polygon::clip;
+use deltille_core::polygon::{bounds, clip};
 use deltille_core::raster::{Coverage, Gray, gaussian};
 
 /// Maximum distance between the image of an edge and its chords, px.

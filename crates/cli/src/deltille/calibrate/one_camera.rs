@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, ensure};
 
 use super::compensation::{self, prepare};
-use super::report_page::note_missing;
+use super::report_page::{check_images, note_missing};
 use super::sightings::{Sightings, SightingsArgs};
 use super::solving::{
     Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out, pose_uncertainty,
@@ -77,9 +77,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             file.ending
         );
     }
-    if let Some(path) = args.images.as_ref().filter(|path| !path.is_dir()) {
-        bail!("--images: {} is not a folder", path.display());
-    }
+    check_images(args.images.iter())?;
     ensure!(
         !args.solve.residuals || args.format.iter().any(|format| format.is_own()),
         "--residuals: the .json that lists them is written with --format own"

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 
 use super::solving::Calibrated;
 use crate::output::{self, Overwrite, log};
@@ -89,6 +89,14 @@ fn picture(image: &str, folder: &Path, size_px: [u32; 2]) -> Option<Gray<u8>> {
 /// Returns the path of a view's image in a folder or one of its subfolders. Names in the file cannot lead elsewhere.
 fn picture_of(image: &str, folder: &Path) -> Option<PathBuf> {
     is_within(image).then(|| folder.join(image)).filter(|path| path.is_file())
+}
+
+/// Rejects paths of `--images` that are not folders.
+pub fn check_images<'a>(mut folders: impl Iterator<Item = &'a PathBuf>) -> anyhow::Result<()> {
+    match folders.find(|path| !path.is_dir()) {
+        Some(path) => bail!("--images: {} is not a folder", path.display()),
+        None => Ok(()),
+    }
 }
 
 /// Warns about missing images of views.

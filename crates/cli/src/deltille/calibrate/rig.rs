@@ -9,7 +9,7 @@ use anyhow::{Context, anyhow, bail, ensure};
 use super::compensation::{self, AllFrames, prepare, times_ns};
 use super::detection_files::is_same;
 use super::filming::{self, Given};
-use super::report_page::note_missing;
+use super::report_page::{check_images, note_missing};
 use super::rig_cameras::{CamerasArgs, Source, check_named, follow, named};
 use super::sightings::{self, GridArgs, SheetArgs, check_every};
 use super::solving::{
@@ -99,9 +99,7 @@ pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
     for (option, given) in [("--known", &args.known), ("--images", &args.images)] {
         check_named(option, given.iter().map(|(name, _)| name.as_str()), &names)?;
     }
-    if let Some((_, path)) = args.images.iter().find(|(_, path)| !path.is_dir()) {
-        bail!("--images: {} is not a folder", path.display());
-    }
+    check_images(args.images.iter().map(|(_, path)| path))?;
     ensure!(
         !names.contains(&args.stem.as_str()),
         "-o: {0}.json is not a file of the rig, because one of its cameras is called {0}; use another name",

@@ -19,7 +19,7 @@ use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 use super::mesh::smallest_cell_mm;
 pub use super::meshing::{INLAY_MM, MIN_INLAY_MM};
 use super::meshing::{MeshError, Meshing};
-use deltille_core::polygon::{hull, rectangle};
+use deltille_core::polygon::{bounds, hull, rectangle};
 use deltille_core::targets::{Panel, Polyhedron, Target, TargetError, TargetSpec};
 use deltille_layout::artwork::{Part, Shape, panel_shapes, subject};
 
@@ -95,8 +95,8 @@ impl InlaidBodies {
     }
 
     /// Returns width, depth and height, mm, of the bodies with a board on the bed of a printer, and the scale at which
-    /// they just fit on a bed of this width and depth. Of all boards, and of all
-    /// rotations with a side along the bed, those are used that fit best; other rotations if none of these fits.
+    /// they just fit on a bed of this width and depth. Uses the board and the rotation with a side along the bed that
+    /// fit best, or any rotation if none of these fits.
     pub fn on_bed(&self, [width_mm, depth_mm]: [f64; 2]) -> (DVec3, f64) {
         let mut best = (DVec3::ZERO, 0.0);
         for &front in &self.fronts {
@@ -115,8 +115,8 @@ impl InlaidBodies {
             let steps = steps.map(|angle| (false, DVec2::from_angle(angle)));
             for (is_side, along) in sides.chain(steps) {
                 let turned: Vec<DVec2> = footprint.iter().map(|at| along.rotate(*at)).collect();
-                let least = turned.iter().copied().fold(DVec2::INFINITY, DVec2::min);
-                let size = turned.iter().copied().fold(DVec2::NEG_INFINITY, DVec2::max) - least;
+                let [left, lower, right, upper] = bounds(&turned);
+                let size = DVec2::new(right - left, upper - lower);
                 for size in [size, size.yx()] {
                     let scale = (width_mm / size.x).min(depth_mm / size.y);
                     if scale > best.1 && (is_side || best.1 < 1.0) {

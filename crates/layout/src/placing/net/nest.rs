@@ -12,8 +12,8 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::DVec2;
 
-use super::plane::{Motion, bounds};
-use deltille_core::polygon::area;
+use super::plane::Motion;
+use deltille_core::polygon::{area, bounds};
 
 /// Gap between pieces, mm: wide enough for scissors.
 const BLANK_MM: f64 = 2.0;

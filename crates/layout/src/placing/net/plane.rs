@@ -53,14 +53,6 @@ impl Motion {
     }
 }
 
-/// Returns the left, lower, right and upper end of a set of points.
-pub(crate) fn bounds<'a>(points: impl IntoIterator<Item = &'a DVec2>) -> [f64; 4] {
-    let start = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-    let (least, most) =
-        points.into_iter().fold(start, |(least, most), &p| (least.min(p), most.max(p)));
-    [least.x, least.y, most.x, most.y]
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::choice::{Nested, Net, nest_on, nets, outlines};
 use super::drawing::{BLANK_MM, Drawing, WORDS_MM, instructions};
-use super::plane::{Motion, bounds};
+use super::plane::Motion;
 use super::tabs::Tab;
 use super::unfold::{Piece, Sides};
 use crate::Placement;
@@ -274,7 +274,7 @@ fn lay<'a>(
         for &angle in &rotations {
             let turn = Motion::turning(angle);
             let turned: Vec<DVec2> = points.iter().map(|&p| turn.apply(p)).collect();
-            let [left, lower, right, upper] = bounds(&turned);
+            let [left, lower, right, upper] = polygon::bounds(&turned);
             let footprint = Footprint {
                 width: right - left,
                 height: upper - lower + WORDS_MM,

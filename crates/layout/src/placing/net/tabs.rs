@@ -11,9 +11,10 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use super::plane::{TOUCHING_MM, bounds, gap_mm};
+use super::plane::{TOUCHING_MM, gap_mm};
 use super::unfold::{Piece, Side, Sides};
 use deltille_core::angles::tangent;
+use deltille_core::polygon::bounds;
 
 /// Depth of a tab as a fraction of its edge, and its minimum and maximum, mm: the minimum fits the text, the maximum is
 /// sufficient for gluing.

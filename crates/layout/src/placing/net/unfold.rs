@@ -7,7 +7,8 @@ use glam::DVec2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::plane::{Motion, TOUCHING_MM, bounds, gap_mm};
+use super::plane::{Motion, TOUCHING_MM, gap_mm};
+use deltille_core::polygon::bounds;
 use deltille_core::targets::sides;
 use deltille_core::targets::{Polyhedron, SolidShape};
 
