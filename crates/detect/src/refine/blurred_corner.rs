@@ -21,6 +21,8 @@
 
 use std::f32::consts::{FRAC_1_SQRT_2, FRAC_2_PI, LN_2, LOG2_E};
 
+use super::pattern::{Combination, Distances, Pattern, Shade, Shades, combine};
+
 /// √(2/π): the slope of erf(h/√2) at 0.
 pub(super) const SLOPE: f32 = 0.797_884_6;
 
@@ -42,61 +44,9 @@ const RULE_OF_THREE: [(f64, f64); 3] =
 /// Largest ρ for the rule of three points: edges 46° apart.
 pub(crate) const FEW_NODES_RHO: f64 = 0.7;
 
-/// A value with its derivatives.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Shade<const K: usize> {
-    /// f, −1 to 1.
-    pub f: f32,
-    /// ∂f/∂h_k.
-    pub slopes: [f32; K],
-    /// ∂f/∂ρ for each of [`PAIRS`]; only the first [`Pattern::CORRELATED`] are used.
-    pub correlations: [f32; PAIRS.len()],
-    /// ∂f/∂α, with the strength α of a halo; 0 without one.
-    pub halo: f32,
-    /// ∂f/∂d_k, if the halves of the edges are displaced.
-    pub shifts: [f32; K],
-    /// Derivatives with respect to half of the motion across each edge; 0 without motion.
-    pub way: [f32; K],
-    /// Derivatives with respect to the strengths of [`WithPixel`]; 0 without it.
-    pub boxed: [f32; K],
-}
-
-/// Pairs of edges.
-pub(crate) const PAIRS: [[usize; 2]; 3] = [[0, 1], [0, 2], [1, 2]];
-
-/// The brightness around a corner of K edges.
-///
-/// A trait, because its methods are compiled for the processor of the loop into which they are inlined. Closures that
-/// are called twice are not.
-pub(crate) trait Pattern<const K: usize> {
-    /// Number of [`PAIRS`] on whose correlation it depends.
-    const CORRELATED: usize;
-
-    /// Returns the brightness at distances h from the edges.
-    fn at(&self, h: [f32; K]) -> Shade<K>;
-}
-
 /// Three edges.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Deltille;
-
-impl Pattern<3> for Deltille {
-    const CORRELATED: usize = 0;
-
-    #[inline(always)]
-    fn at(&self, h: [f32; 3]) -> Shade<3> {
-        deltille(h)
-    }
-}
-
-impl<const NODES: usize> Pattern<2> for Orthant<NODES> {
-    const CORRELATED: usize = 1;
-
-    #[inline(always)]
-    fn at(&self, h: [f32; 2]) -> Shade<2> {
-        self.checker(h)
-    }
-}
 
 /// The corner of a sharpened image: (1 + α)·f(h) − α·f(h/w). A pattern of edges is linear in the point spread function,
 /// so this is exact for a Gaussian mask.
@@ -106,6 +56,13 @@ pub(crate) struct Haloed<P> {
     pub pattern: P,
     /// The same pattern at the width of the halo, at distances in its units; only its motion differs.
     pub wide: P,
+    /// The halo.
+    pub halo: Halo,
+}
+
+/// A halo.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Halo {
     /// α.
     pub strength: f32,
     /// 1/w.
@@ -113,11 +70,18 @@ pub(crate) struct Haloed<P> {
 }
 
 impl<const K: usize, P: Pattern<K>> Pattern<K> for Haloed<P> {
-    const CORRELATED: usize = P::CORRELATED;
+    fn shade(&self, distances: &Distances<K>, shades: &mut Shades<K>) {
+        let (mut sharp, mut wide) = (Shades::NONE, Shades::NONE);
+        let narrower = self.halo.narrower;
+        self.pattern.shade(distances, &mut sharp);
+        self.wide.shade(&distances.map(|h| h.map(|h| h * narrower)), &mut wide);
+        combine(&self.halo, distances, [&sharp, &wide], shades);
+    }
+}
 
+impl<const K: usize> Combination<K, 2> for Halo {
     #[inline(always)]
-    fn at(&self, h: [f32; K]) -> Shade<K> {
-        let (sharp, wide) = (self.pattern.at(h), self.wide.at(h.map(|h| h * self.narrower)));
+    fn at(&self, _: [f32; K], [sharp, wide]: [Shade<K>; 2]) -> Shade<K> {
         let both = |sharp: f32, wide: f32| sharp + self.strength * (sharp - wide);
         Shade {
             f: both(sharp.f, wide.f),
@@ -152,12 +116,19 @@ impl<P, const K: usize> WithPixel<P, K> {
     }
 }
 
-impl Pattern<3> for WithPixel<Deltille, 3> {
-    const CORRELATED: usize = 0;
+impl<P, const K: usize> Pattern<K> for WithPixel<P, K>
+where
+    Self: Combination<K, 0>,
+{
+    fn shade(&self, distances: &Distances<K>, shades: &mut Shades<K>) {
+        combine(self, distances, [], shades);
+    }
+}
 
+impl Combination<3, 0> for WithPixel<Deltille, 3> {
     #[inline(always)]
-    fn at(&self, h: [f32; 3]) -> Shade<3> {
-        let mut shade = self.edges.at(h);
+    fn at(&self, h: [f32; 3], _: [Shade<3>; 0]) -> Shade<3> {
+        let mut shade = deltille(h);
         for (k, h) in h.into_iter().enumerate() {
             let (square, slope) = (h * h, shade.slopes[k]);
             shade.boxed[k] = h * (square - 3.0) * slope;
@@ -168,11 +139,9 @@ impl Pattern<3> for WithPixel<Deltille, 3> {
     }
 }
 
-impl<const NODES: usize> Pattern<2> for WithPixel<Orthant<NODES>, 2> {
-    const CORRELATED: usize = 1;
-
+impl<const NODES: usize> Combination<2, 0> for WithPixel<Orthant<NODES>, 2> {
     #[inline(always)]
-    fn at(&self, h: [f32; 2]) -> Shade<2> {
+    fn at(&self, h: [f32; 2], _: [Shade<2>; 0]) -> Shade<2> {
         let still = self.edges.checker(h);
         let mut shade = still;
         // The slope of an edge changes by `mixed` with the distance from the other.
@@ -226,22 +195,19 @@ impl SweptDeltille {
 }
 
 impl Pattern<3> for SweptDeltille {
-    const CORRELATED: usize = 0;
+    fn shade(&self, distances: &Distances<3>, shades: &mut Shades<3>) {
+        combine(self, distances, [], shades);
+    }
+}
 
+impl Combination<3, 0> for SweptDeltille {
     #[inline(always)]
-    fn at(&self, h: [f32; 3]) -> Shade<3> {
+    fn at(&self, h: [f32; 3], _: [Shade<3>; 0]) -> Shade<3> {
         let [f1, slope1, way1] = self.edge(0, h[0]);
         let [f2, slope2, way2] = self.edge(1, h[1]);
         let [f3, slope3, way3] = self.edge(2, h[2]);
-        Shade {
-            f: f1 - f2 + f3,
-            slopes: [slope1, -slope2, slope3],
-            correlations: [0.0; PAIRS.len()],
-            halo: 0.0,
-            shifts: [0.0; 3],
-            way: [way1, -way2, way3],
-            boxed: [0.0; 3],
-        }
+        let way = [way1, -way2, way3];
+        Shade { way, ..Shade::new(f1 - f2 + f3, [slope1, -slope2, slope3]) }
     }
 }
 
@@ -258,13 +224,29 @@ pub(crate) struct SweptChecker<P> {
 /// Fraction of the variance of a box that comes from the positions of its four equal parts.
 pub(crate) const PLACES_OF_FOUR: f64 = 15.0 / 16.0;
 
-impl<P: Pattern<2>> Pattern<2> for SweptChecker<P> {
-    const CORRELATED: usize = 1;
+/// The distances of the centres of four equal parts from that of the whole, as fractions of half of its length: each of
+/// two parts behind and ahead.
+const PARTS: [f32; 2] = [0.75, 0.25];
 
+impl<P: Pattern<2>> Pattern<2> for SweptChecker<P> {
+    fn shade(&self, distances: &Distances<2>, shades: &mut Shades<2>) {
+        let mut four = [const { Shades::NONE }; 4];
+        for (part, pair) in PARTS.into_iter().zip(four.as_chunks_mut::<2>().0) {
+            let [x, y] = self.way.map(|way| part * way);
+            self.pattern.shade(&distances.map(|[a, b]| [a - x, b - y]), &mut pair[0]);
+            self.pattern.shade(&distances.map(|[a, b]| [a + x, b + y]), &mut pair[1]);
+        }
+        combine(&MeanOfParts, distances, four.each_ref(), shades);
+    }
+}
+
+/// The mean of four parts of a motion, in the order of [`PARTS`].
+struct MeanOfParts;
+
+impl Combination<2, 4> for MeanOfParts {
     #[inline(always)]
-    fn at(&self, h: [f32; 2]) -> Shade<2> {
-        // The centres of four equal parts.
-        let (outer, inner) = (self.pair(h, 0.75), self.pair(h, 0.25));
+    fn at(&self, _: [f32; 2], [a, b, c, d]: [Shade<2>; 4]) -> Shade<2> {
+        let (outer, inner) = (mean_of_pair(a, b, PARTS[0]), mean_of_pair(c, d, PARTS[1]));
         Shade {
             f: 0.5 * (outer.f + inner.f),
             slopes: mean(outer.slopes, inner.slopes),
@@ -277,25 +259,20 @@ impl<P: Pattern<2>> Pattern<2> for SweptChecker<P> {
     }
 }
 
-impl<P: Pattern<2>> SweptChecker<P> {
-    /// Returns the mean of two patterns, at a fraction `part` of half the motion before and behind the centre.
-    #[inline(always)]
-    fn pair(&self, h: [f32; 2], part: f32) -> Shade<2> {
-        let [x, y] = [part * self.way[0], part * self.way[1]];
-        let behind = self.pattern.at([h[0] - x, h[1] - y]);
-        let ahead = self.pattern.at([h[0] + x, h[1] + y]);
-        Shade {
-            f: 0.5 * (behind.f + ahead.f),
-            slopes: mean(behind.slopes, ahead.slopes),
-            correlations: mean(behind.correlations, ahead.correlations),
-            shifts: mean(behind.shifts, ahead.shifts),
-            boxed: mean(behind.boxed, ahead.boxed),
-            way: [
-                0.5 * part * (ahead.slopes[0] - behind.slopes[0]),
-                0.5 * part * (ahead.slopes[1] - behind.slopes[1]),
-            ],
-            ..behind
-        }
+/// Returns the mean of two patterns, at a fraction `part` of half the motion behind and ahead of the centre.
+#[inline(always)]
+fn mean_of_pair(behind: Shade<2>, ahead: Shade<2>, part: f32) -> Shade<2> {
+    Shade {
+        f: 0.5 * (behind.f + ahead.f),
+        slopes: mean(behind.slopes, ahead.slopes),
+        correlations: mean(behind.correlations, ahead.correlations),
+        shifts: mean(behind.shifts, ahead.shifts),
+        boxed: mean(behind.boxed, ahead.boxed),
+        way: [
+            0.5 * part * (ahead.slopes[0] - behind.slopes[0]),
+            0.5 * part * (ahead.slopes[1] - behind.slopes[1]),
+        ],
+        ..behind
     }
 }
 
@@ -306,15 +283,10 @@ pub(super) fn mean<const N: usize>(a: [f32; N], b: [f32; N]) -> [f32; N] {
 
 #[inline(always)]
 fn deltille([h1, h2, h3]: [f32; 3]) -> Shade<3> {
-    Shade {
-        f: erf_sqrt_half(h1) - erf_sqrt_half(h2) + erf_sqrt_half(h3),
-        slopes: [SLOPE * bell(h1), -SLOPE * bell(h2), SLOPE * bell(h3)],
-        correlations: [0.0; PAIRS.len()],
-        halo: 0.0,
-        shifts: [0.0; 3],
-        way: [0.0; 3],
-        boxed: [0.0; 3],
-    }
+    Shade::new(
+        erf_sqrt_half(h1) - erf_sqrt_half(h2) + erf_sqrt_half(h3),
+        [SLOPE * bell(h1), -SLOPE * bell(h2), SLOPE * bell(h3)],
+    )
 }
 
 /// Terms of the orthant integral that depend only on ρ, computed once for all pixels.
@@ -364,18 +336,13 @@ impl<const NODES: usize> Orthant<NODES> {
         }
         let [towards_1, towards_2] = [h2 - self.rho * h1, h1 - self.rho * h2];
         let exponent = (squares - 2.0 * self.rho * product) * -0.5 / (self.sine * self.sine);
-        Shade {
-            f: erf_sqrt_half(h1) * erf_sqrt_half(h2) + self.scale * integral,
-            slopes: [
-                SLOPE * bell(h1) * erf_sqrt_half(towards_1 / self.sine),
-                SLOPE * bell(h2) * erf_sqrt_half(towards_2 / self.sine),
-            ],
-            correlations: [FRAC_2_PI / self.sine * exp_negative(exponent), 0.0, 0.0],
-            halo: 0.0,
-            shifts: [0.0; 2],
-            way: [0.0; 2],
-            boxed: [0.0; 2],
-        }
+        let slopes = [
+            SLOPE * bell(h1) * erf_sqrt_half(towards_1 / self.sine),
+            SLOPE * bell(h2) * erf_sqrt_half(towards_2 / self.sine),
+        ];
+        let correlations = [FRAC_2_PI / self.sine * exp_negative(exponent), 0.0, 0.0];
+        let f = erf_sqrt_half(h1) * erf_sqrt_half(h2) + self.scale * integral;
+        Shade { correlations, ..Shade::new(f, slopes) }
     }
 
     /// Returns the part of the blurred light that comes from the positive sides of both edges.
@@ -460,6 +427,7 @@ pub(crate) fn exp_negative(x: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::refine::pattern::at;
 
     #[test]
     fn special_functions_agree_with_those_of_libm() {
@@ -492,19 +460,19 @@ mod tests {
             let three = WithPixel { edges: Deltille, strengths: [0.1, 0.05, 0.02] };
             for k in 0..3 {
                 let moved = |by: f32| std::array::from_fn(|j| h[j] + if j == k { by } else { 0.0 });
-                let (up, down) = (three.at(moved(step)).f, three.at(moved(-step)).f);
-                close(three.at(h).slopes[k], up, down, 2.0 * step);
+                let (up, down) = (at(&three, moved(step)).f, at(&three, moved(-step)).f);
+                close(at(&three, h).slopes[k], up, down, 2.0 * step);
             }
             let orthant = Orthant::new(rho);
             let h = [h[0], h[1]];
             let two = |rho: f64| WithPixel { edges: Orthant::new(rho), strengths: [0.1, 0.05] };
             for k in 0..2 {
                 let moved = |by: f32| std::array::from_fn(|j| h[j] + if j == k { by } else { 0.0 });
-                let (up, down) = (two(rho).at(moved(step)).f, two(rho).at(moved(-step)).f);
-                close(two(rho).at(h).slopes[k], up, down, 2.0 * step);
+                let (up, down) = (at(&two(rho), moved(step)).f, at(&two(rho), moved(-step)).f);
+                close(at(&two(rho), h).slopes[k], up, down, 2.0 * step);
             }
-            let quotient = (two(rho + 0.01).at(h).f - two(rho - 0.01).at(h).f) / 0.02;
-            let derivative = two(rho).at(h).correlations[0];
+            let quotient = (at(&two(rho + 0.01), h).f - at(&two(rho - 0.01), h).f) / 0.02;
+            let derivative = at(&two(rho), h).correlations[0];
             assert!((derivative - quotient).abs() < 1e-2 * derivative.abs().max(0.1));
             for k in 0..2 {
                 let moved = |by: f32| std::array::from_fn(|j| h[j] + if j == k { by } else { 0.0 });
@@ -531,7 +499,7 @@ mod tests {
                 places.map(of).sum::<f32>() / STEPS as f32
             };
             let three = along(&|t| deltille([0, 1, 2].map(|k| h[k] + t * way[k])).f);
-            let swept = |way: [f32; 3]| SweptDeltille::new(way).at(h);
+            let swept = |way: [f32; 3]| at(&SweptDeltille::new(way), h);
             // At the shortest motions, the minimum length adds blur.
             let error = swept(way).f - three;
             assert!(error.abs() < 3e-3, "{h:?} {way:?}: {error}");
@@ -543,13 +511,14 @@ mod tests {
             }
             // Two edges: each of four parts is longer than the Gaussian that represents it, by less than its width.
             let (h, way) = ([h[0], h[1]], [way[0] / 2.0, way[1] / 2.0]);
-            let two = along(&|t| still.at([0, 1].map(|k| h[k] + t * way[k])).f);
+            let two = along(&|t| still.checker([0, 1].map(|k| h[k] + t * way[k])).f);
             let cov = |k: usize, l: usize| way[k] * way[l] / 48.0;
             let spread = [1.0 + cov(0, 0), 1.0 + cov(1, 1)].map(f32::sqrt);
             let rho = (0.3 + cov(0, 1)) / (spread[0] * spread[1]);
-            let pattern = Orthant::new(f64::from(rho));
+            let edges = Orthant::new(f64::from(rho));
+            let pattern = WithPixel { edges, strengths: [0.0; 2] };
             let units = |v: [f32; 2]| [v[0] / spread[0], v[1] / spread[1]];
-            let four = SweptChecker { pattern, way: units(way) }.at(units(h)).f;
+            let four = at(&SweptChecker { pattern, way: units(way) }, units(h)).f;
             assert!((four - two).abs() < 2e-3, "{h:?} {way:?}: {four} or {two}");
         }
     }

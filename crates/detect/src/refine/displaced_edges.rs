@@ -15,9 +15,8 @@
 
 use glam::{DMat2, DVec2};
 
-use super::blurred_corner::{
-    Orthant, PAIRS, Pattern, SLOPE, Shade, bell, erf_sqrt_half, exp_negative, mean,
-};
+use super::blurred_corner::{Orthant, SLOPE, bell, erf_sqrt_half, exp_negative, mean};
+use super::pattern::{Combination, Distances, PAIRS, Pattern, Shade, Shades, combine};
 
 /// Largest root mean square radius of a triangle that is treated as a spot, in units of the blur. Its third moments are
 /// neglected, which changes the brightness by up to 10⁻³ at this size, and by the fifth power of the size below it.
@@ -28,6 +27,13 @@ const MAX_SPOT: f64 = 0.4;
 pub(crate) struct WithTriangle<P> {
     /// The edges without the triangle.
     pub edges: P,
+    /// The triangle.
+    pub triangle: Triangle,
+}
+
+/// The triangle between three displaced edges.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Triangle {
     /// The pairs of edges.
     pub pairs: [Orthant<6>; PAIRS.len()],
     /// 1 if areas of f = −1 have grown, −1 if they have shrunk.
@@ -37,11 +43,16 @@ pub(crate) struct WithTriangle<P> {
 }
 
 impl<P: Pattern<3>> Pattern<3> for WithTriangle<P> {
-    const CORRELATED: usize = PAIRS.len();
+    fn shade(&self, distances: &Distances<3>, shades: &mut Shades<3>) {
+        let mut edges = Shades::NONE;
+        self.edges.shade(distances, &mut edges);
+        combine(&self.triangle, distances, [&edges], shades);
+    }
+}
 
+impl Combination<3, 1> for Triangle {
     #[inline(always)]
-    fn at(&self, h: [f32; 3]) -> Shade<3> {
-        let mut shade = self.edges.at(h);
+    fn at(&self, h: [f32; 3], [mut shade]: [Shade<3>; 1]) -> Shade<3> {
         let weight = 0.5 * self.sign;
         shade.f += weight;
         for (p, [i, j]) in PAIRS.into_iter().enumerate() {
@@ -66,6 +77,13 @@ impl<P: Pattern<3>> Pattern<3> for WithTriangle<P> {
 pub(crate) struct WithSpot<P> {
     /// The edges without the triangle.
     edges: P,
+    /// The triangle.
+    spot: Spot,
+}
+
+/// A small triangle between three displaced edges.
+#[derive(Clone, Copy, Debug)]
+struct Spot {
     /// aᵢ.
     weights: [f32; 3],
     /// 1/(3aᵢ).
@@ -111,22 +129,27 @@ impl<P> WithSpot<P> {
         }
         let area = 1.0 / (2.0 * a.iter().product::<f64>().abs());
         let peak = area / (std::f64::consts::PI * cov.determinant().sqrt());
-        Some(Self {
-            edges,
+        let spot = Spot {
             weights: a.map(|a| a as f32),
             centroid: centroid.map(|part| part as f32),
             peak: peak as f32,
             form,
-        })
+        };
+        Some(Self { edges, spot })
     }
 }
 
 impl<P: Pattern<3>> Pattern<3> for WithSpot<P> {
-    const CORRELATED: usize = 0;
+    fn shade(&self, distances: &Distances<3>, shades: &mut Shades<3>) {
+        let mut edges = Shades::NONE;
+        self.edges.shade(distances, &mut edges);
+        combine(&self.spot, distances, [&edges], shades);
+    }
+}
 
+impl Combination<3, 1> for Spot {
     #[inline(always)]
-    fn at(&self, h: [f32; 3]) -> Shade<3> {
-        let mut shade = self.edges.at(h);
+    fn at(&self, h: [f32; 3], [mut shade]: [Shade<3>; 1]) -> Shade<3> {
         let (a, form) = (&self.weights, &self.form);
         let c = a[0] * h[0] + a[1] * h[1] + a[2] * h[2];
         let away: [f32; 3] = std::array::from_fn(|k| h[k] - self.centroid[k] * c);
@@ -152,26 +175,44 @@ impl<P: Pattern<3>> Pattern<3> for WithSpot<P> {
 pub(crate) struct Parted<P> {
     /// The pattern without displacement.
     pub edges: P,
-    /// Displacements of the edges into areas of f = 1, in units of the blur.
-    pub by: [f32; 2],
+    /// The displacement.
+    pub displaced: Displaced,
+}
+
+/// Displacements of two edges into areas of f = 1, in units of the blur.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Displaced(pub [f32; 2]);
+
+impl Displaced {
+    /// The sign with which the second edge is displaced where the first is displaced by d₁.
+    #[inline(always)]
+    fn sign(&self) -> f32 {
+        if self.0[0] + self.0[1] < 0.0 { -1.0 } else { 1.0 }
+    }
 }
 
 impl<P: Pattern<2>> Pattern<2> for Parted<P> {
-    const CORRELATED: usize = 1;
+    fn shade(&self, distances: &Distances<2>, shades: &mut Shades<2>) {
+        let [d1, d2] = self.displaced.0;
+        let d2 = self.displaced.sign() * d2;
+        let (mut ahead, mut behind) = (Shades::NONE, Shades::NONE);
+        self.edges.shade(&distances.map(|[a, b]| [a + d1, b + d2]), &mut ahead);
+        self.edges.shade(&distances.map(|[a, b]| [a - d1, b - d2]), &mut behind);
+        combine(&self.displaced, distances, [&ahead, &behind], shades);
+    }
+}
 
+impl Combination<2, 2> for Displaced {
     #[inline(always)]
-    fn at(&self, h: [f32; 2]) -> Shade<2> {
-        let [d1, d2] = self.by;
-        let sign = if d1 + d2 < 0.0 { -1.0 } else { 1.0 };
-        let ahead = self.edges.at([h[0] + d1, h[1] + sign * d2]);
-        let behind = self.edges.at([h[0] - d1, h[1] - sign * d2]);
+    fn at(&self, h: [f32; 2], [ahead, behind]: [Shade<2>; 2]) -> Shade<2> {
+        let (by, sign) = (self.0, self.sign());
         let (mut f, mut slopes) = (0.5 * (ahead.f + behind.f), mean(ahead.slopes, behind.slopes));
         let mut shifts = [
             0.5 * (ahead.slopes[0] - behind.slopes[0]),
             0.5 * sign * (ahead.slopes[1] - behind.slopes[1]),
         ];
         for k in 0..2 {
-            let [there, back] = [h[k] + self.by[k], h[k] - self.by[k]];
+            let [there, back] = [h[k] + by[k], h[k] - by[k]];
             let [steep, flat] = [SLOPE * bell(there), SLOPE * bell(back)];
             f -= 0.5 * (erf_sqrt_half(there) - erf_sqrt_half(back));
             slopes[k] -= 0.5 * (steep - flat);
@@ -186,7 +227,10 @@ impl<P: Pattern<2>> Pattern<2> for Parted<P> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::refine::blurred_corner::Deltille;
+    use crate::refine::blurred_corner::{Deltille, WithPixel};
+    use crate::refine::pattern::at;
+
+    const THREE_EDGES: WithPixel<Deltille, 3> = WithPixel { edges: Deltille, strengths: [0.0; 3] };
 
     /// Integrates displaced edges over a Gaussian blur, and compares them with the patterns and their derivatives.
     #[test]
@@ -226,8 +270,11 @@ mod tests {
                     false => -1.0,
                 }
             });
-            let parted =
-                |h: [f32; 2], by: [f32; 2]| Parted { edges: Orthant::new(rho(0, 1)), by }.at(h);
+            let edges = Orthant::new(rho(0, 1));
+            let two_edges = WithPixel { edges, strengths: [0.0; 2] };
+            let parted = |h: [f32; 2], by: [f32; 2]| {
+                at(&Parted { edges: two_edges, displaced: Displaced(by) }, h)
+            };
             let (h2, by2) = ([h[0] as f32, h[1] as f32], by.map(|by| by as f32));
             let found = parted(h2, by2);
             assert!((f64::from(found.f) - two).abs() < 4e-3, "{case}: {} or {two}", found.f);
@@ -249,9 +296,9 @@ mod tests {
                 sum.clamp(-1.0, 1.0)
             });
             let pairs = PAIRS.map(|[i, j]| Orthant::new(rho(i, j)));
-            let inked =
-                WithTriangle { edges: Deltille, pairs, sign: sign as f32, narrower: [1.0; 3] };
-            let found = inked.at([0, 1, 2].map(|k| (h[k] - off[k]) as f32)).f;
+            let triangle = Triangle { pairs, sign: sign as f32, narrower: [1.0; 3] };
+            let inked = WithTriangle { edges: THREE_EDGES, triangle };
+            let found = at(&inked, [0, 1, 2].map(|k| (h[k] - off[k]) as f32)).f;
             assert!((f64::from(found) - three).abs() < 4e-3, "{case}: {found} or {three}");
         }
     }
@@ -265,25 +312,25 @@ mod tests {
             let rhos = PAIRS.map(|[i, j]| rho(i, j));
             let sign = if case % 2 == 0 { 1.0 } else { -1.0 };
             let moved = [0.25 * sign, -0.2 * sign, 0.22 * sign];
-            let spot = WithSpot::new(Deltille, rhos, moved).unwrap();
+            let spot = WithSpot::new(THREE_EDGES, rhos, moved).unwrap();
             let pairs = rhos.map(Orthant::new);
-            let exact =
-                WithTriangle { edges: Deltille, pairs, sign: sign as f32, narrower: [1.0; 3] };
+            let triangle = Triangle { pairs, sign: sign as f32, narrower: [1.0; 3] };
+            let exact = WithTriangle { edges: THREE_EDGES, triangle };
             let place = [f64::from(case % 14) * 0.5 - 3.2, f64::from(case / 14) * 0.5 - 3.4];
             let h = [0, 1, 2].map(|k| {
                 (place[1] * angles[k].cos() - place[0] * angles[k].sin() - moved[k]) as f32
             });
-            let (found, expected) = (spot.at(h), exact.at(h));
+            let (found, expected) = (at(&spot, h), at(&exact, h));
             assert!((found.f - expected.f).abs() < 5e-4, "{case}: {} {}", found.f, expected.f);
             for k in 0..3 {
                 assert!((found.slopes[k] - expected.slopes[k]).abs() < 1e-2, "{case}");
                 let moved =
-                    |by: f32| spot.at([0, 1, 2].map(|j| h[j] + if j == k { by } else { 0.0 })).f;
+                    |by: f32| at(&spot, [0, 1, 2].map(|j| h[j] + if j == k { by } else { 0.0 })).f;
                 let quotient = (moved(0.01) - moved(-0.01)) / 0.02;
                 assert!((quotient - found.slopes[k]).abs() < 1e-3, "{case}: {quotient}");
             }
         }
-        assert!(WithSpot::new(Deltille, [0.5, -0.5, 0.5], [1.0, -1.0, 1.0]).is_none());
-        assert!(WithSpot::new(Deltille, [1.0, 0.5, 0.5], [0.1, -0.1, 0.1]).is_none());
+        assert!(WithSpot::new(THREE_EDGES, [0.5, -0.5, 0.5], [1.0, -1.0, 1.0]).is_none());
+        assert!(WithSpot::new(THREE_EDGES, [1.0, 0.5, 0.5], [0.1, -0.1, 0.1]).is_none());
     }
 }

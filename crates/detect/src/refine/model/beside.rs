@@ -8,8 +8,9 @@ use glam::DVec2;
 
 use super::corner::Corner;
 use super::window::{Border, MAX_PIXELS, Window};
-use crate::refine::blurred_corner::{Orthant, Shade};
+use crate::refine::blurred_corner::Orthant;
 use crate::refine::optics::{Optics, Spread};
+use crate::refine::pattern::Shade;
 
 /// Largest correlation of the blur across two sides; beyond it, a square is a line.
 const MAX_RHO: f64 = 0.99;

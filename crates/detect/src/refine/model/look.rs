@@ -1,9 +1,10 @@
 //! Effect of the optics on a corner: the same for all of its pixels, and computed once.
 
 use super::corner::{Corner, MIN_BLUR_PX};
-use crate::refine::blurred_corner::{Haloed, Orthant, PAIRS, WithPixel};
-use crate::refine::displaced_edges::{Parted, WithSpot, WithTriangle};
+use crate::refine::blurred_corner::{Halo, Haloed, Orthant, WithPixel};
+use crate::refine::displaced_edges::{Displaced, Parted, Triangle, WithSpot, WithTriangle};
 use crate::refine::optics::{INK_UNIT, Optics};
+use crate::refine::pattern::PAIRS;
 use deltille_core::detection::Piece;
 
 /// Effect of the optics on a corner with K edges.
@@ -211,24 +212,22 @@ impl<const K: usize> Look<K> {
             let rho = self.correlations[p].rho as f32 + way(i) * way(j) / 3.0;
             Orthant::new(f64::from(rho * narrower[i] * narrower[j]))
         });
-        WithTriangle { edges, pairs, sign: self.displaced[0].signum() as f32, narrower }
+        let sign = self.displaced[0].signum() as f32;
+        WithTriangle { edges, triangle: Triangle { pairs, sign, narrower } }
     }
 
     /// Returns these two edges with their halves displaced, and all lengths multiplied by a factor.
     pub(super) fn parted<P>(&self, edges: P, factor: f32) -> Parted<P> {
-        Parted { edges, by: [0, 1].map(|k| self.displaced[k] as f32 * factor) }
+        let displaced = Displaced([0, 1].map(|k| self.displaced[k] as f32 * factor));
+        Parted { edges, displaced }
     }
 
     /// Returns the haloed pattern. `pattern` creates the pattern with its own lengths multiplied by
     /// a factor.
     pub(super) fn haloed_of<P>(&self, pattern: impl Fn(f32) -> P) -> Haloed<P> {
         let [strength, width] = self.halo;
-        Haloed {
-            pattern: pattern(1.0),
-            wide: pattern(1.0 / width),
-            strength,
-            narrower: 1.0 / width,
-        }
+        let halo = Halo { strength, narrower: 1.0 / width };
+        Haloed { pattern: pattern(1.0), wide: pattern(halo.narrower), halo }
     }
 }
 

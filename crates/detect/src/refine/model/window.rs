@@ -3,14 +3,15 @@
 use glam::DVec2;
 
 use crate::lanes::LANES;
+use crate::refine::pattern::BLOCK;
 use deltille_core::raster::ImageView;
 
 /// Largest radius of a window, px.
 pub(crate) const MAX_RADIUS: usize = 15;
 
-/// Number of pixels of the largest window, rounded up to whole vectors.
+/// Number of pixels of the largest window, rounded up to whole blocks.
 pub(super) const MAX_PIXELS: usize =
-    ((2 * MAX_RADIUS + 1) * (2 * MAX_RADIUS + 1)).next_multiple_of(LANES);
+    ((2 * MAX_RADIUS + 1) * (2 * MAX_RADIUS + 1)).next_multiple_of(BLOCK);
 
 /// The corners of the border of a tag in a tile beside the corner, px from the corner, the nearest first. Its colour is
 /// opposite to that of the tile.
