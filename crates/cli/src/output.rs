@@ -93,10 +93,15 @@ fn any_of(words: &[String]) -> String {
 
 /// Returns the file that `-o` means, see [`place`]: in a folder, `<stem>.<extension>`.
 pub fn file(output: &Path, stem: &str, extension: &str) -> anyhow::Result<PathBuf> {
-    let Place { folder, file } = place(output, &[extension])?;
+    file_of(output, stem, &[extension])
+}
+
+/// Returns the file that `-o` means, which has one of these extensions, in lower case: the first of them in a folder.
+pub fn file_of(output: &Path, stem: &str, extensions: &[&str]) -> anyhow::Result<PathBuf> {
+    let Place { folder, file } = place(output, extensions)?;
     Ok(match file {
-        Some(_) => output.with_extension(extension),
-        None => folder.join(format!("{stem}.{extension}")),
+        Some(file) => output.with_extension(file.ending),
+        None => folder.join(format!("{stem}.{}", extensions[0])),
     })
 }
 

@@ -6,8 +6,9 @@ use deltille::calibrate::{
     self, CameraEstimate, CameraMotion, Diagnosis, Estimate, Messages, Reference, Region,
     compare_boards, views,
 };
+use deltille::export::comparison;
+use deltille::export::pose::PoseFormat;
 use deltille::export::sheet::Sheet;
-use deltille::export::{comparison, pose};
 use deltille::glam::DVec2;
 use deltille::targets::TargetIdentity;
 use numpy::{PyArray1, PyArray2};
@@ -408,11 +409,11 @@ impl Located {
         let time_ns = self.asked.detection.found.time_ns;
         match found {
             Some((estimate, view)) => {
-                pose::write_line(estimate, view, time_ns, self.asked.target.target())
+                PoseFormat::JsonLines.line(estimate, view, time_ns, self.asked.target.target())
             }
             None => {
                 let why = self.why.as_deref().unwrap_or_default();
-                pose::write_none(&self.image, time_ns, &self.target, why)
+                PoseFormat::JsonLines.line_without(&self.image, time_ns, &self.target, why)
             }
         }
     }

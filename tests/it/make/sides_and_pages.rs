@@ -89,6 +89,19 @@ fn a_board_with_two_sides_is_one_target_for_poses() {
         let off = at(line).iter().zip(at(&read(truth))).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
         assert!(off.sqrt() < 0.1, "{truth}: {} mm", off.sqrt());
     }
+    std::fs::write(folder.path().join("text.png"), "text").unwrap();
+    let pose = "pose front.png back.png text.png --camera camera.yaml --target board.json --all-images -o poses.csv";
+    deltille(folder.path(), pose).code(1);
+    let table = read("poses.csv");
+    let lines: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
+    assert!(lines.iter().all(|cells| cells.len() == lines[0].len()), "{table}");
+    let column = |name: &str| lines[0].iter().position(|column| *column == name).unwrap();
+    for (cells, line) in lines[1..].iter().zip(read("poses.ndjson").lines()) {
+        let place = ["x_mm", "y_mm", "z_mm"];
+        let place = place.map(|name| cells[column(name)].parse::<f64>().unwrap());
+        assert_eq!(place.as_slice(), at(line));
+    }
+    assert_eq!((lines.len(), lines[3][column("x_mm")]), (4, ""));
 }
 
 #[test]

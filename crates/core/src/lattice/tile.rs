@@ -22,6 +22,13 @@ pub enum GridKind {
 const SQUARE_STEPS: [Vertex; 4] =
     [Vertex::new(0, 1), Vertex::new(1, 0), Vertex::new(0, -1), Vertex::new(-1, 0)];
 
+/// Returns the largest integer that is not greater. Unlike [`f64::floor`], this is no function call on processors
+/// without SSE 4.1, for which programs are compiled.
+fn floor(value: f64) -> i32 {
+    let whole = value as i32;
+    whole.saturating_sub(i32::from(value < f64::from(whole)))
+}
+
 impl GridKind {
     /// Returns the steps to the neighbours of a vertex, counterclockwise on the print, starting along the row.
     pub const fn steps(self) -> &'static [Vertex] {
@@ -73,10 +80,12 @@ impl GridKind {
     pub fn tile_at(self, DVec2 { x, y }: DVec2) -> Tile {
         let row = if self == Self::Deltille { y / ROW_HEIGHT } else { y };
         let col = if self == Self::Deltille { x - row / 2.0 } else { x };
-        let anchor = Vertex::new(row.floor() as i32, col.floor() as i32);
+        let anchor = Vertex::new(floor(row), floor(col));
         match self {
             Self::Checker => Tile::square(anchor),
-            Self::Deltille if row - row.floor() + col - col.floor() < 1.0 => Tile::upright(anchor),
+            Self::Deltille if row - f64::from(anchor.row) + col - f64::from(anchor.col) < 1.0 => {
+                Tile::upright(anchor)
+            }
             Self::Deltille => Tile::inverted(anchor),
         }
     }

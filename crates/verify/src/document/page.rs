@@ -59,15 +59,19 @@ impl Page {
     /// along the pixels, and the model would then be off by up to a quarter of a pixel.
     pub fn blurred(&self) -> Gray<u16> {
         let (width, height) = (self.image.width(), self.image.height());
-        let near = |i: usize, size: usize| [i.saturating_sub(1), i, i, (i + 1).min(size - 1)];
         let mut blurred = Gray::new(width, height);
+        // Sums over columns, and the first and the last once more beyond the borders.
+        let mut sums = vec![0; width + 2];
         for y in 0..height {
-            let rows = near(y, height).map(|y| self.image.row(y));
-            let down = |x: usize| rows.iter().map(|row| u32::from(row[x])).sum::<u32>();
-            for (x, pixel) in blurred.row_mut(y).iter_mut().enumerate() {
+            let row = |y: usize| self.image.row(y).iter().map(|&v| u32::from(v));
+            let beside = row(y.saturating_sub(1)).zip(row((y + 1).min(height - 1)));
+            for ((sum, here), (above, below)) in sums[1..].iter_mut().zip(row(y)).zip(beside) {
+                *sum = above + 2 * here + below;
+            }
+            (sums[0], sums[width + 1]) = (sums[1], sums[width]);
+            for (pixel, near) in blurred.row_mut(y).iter_mut().zip(sums.windows(3)) {
                 // The weights of the sixteen samples sum to 16; full scale is 257 · 255.
-                let sum: u32 = near(x, width).into_iter().map(down).sum();
-                *pixel = (sum * 257 / 16) as u16;
+                *pixel = ((near[0] + 2 * near[1] + near[2]) * 257 / 16) as u16;
             }
         }
         blurred

@@ -5,6 +5,7 @@ use glam::{DVec2, DVec3};
 
 use crate::document::page::Page;
 use crate::model::mesh::{Model, Triangle};
+use crate::model::samples::for_each_sample;
 use crate::verifier::Verifier;
 use deltille_core::polygon;
 use deltille_core::polygon::rectangle;
@@ -70,29 +71,13 @@ pub(super) fn face_page(
     let mut texel_px = 0.0f64;
     for Front { triangle, flat } in front {
         // In samples of the page, with centres at integers; y points down there and up on the panel.
-        let [a, b, c] =
-            flat.map(|p| DVec2::new(p.x - left, upper - p.y) * scale - DVec2::splat(0.5));
-        let area = (b - a).perp_dot(c - a);
+        let corners = flat.map(|p| DVec2::new(p.x - left, upper - p.y) * scale - 0.5);
         let (texture, size) = model.texture(triangle);
         texel_px = texel_px.max(model.texel_mm(triangle) * px_per_mm);
-        let low = a.min(b).min(c).ceil().max(DVec2::ZERO);
-        let high = a.max(b).max(c).floor() + 1.0;
-        let end = |high: f64, size: usize| (high.max(0.0) as usize).min(size);
-        for y in low.y as usize..end(high.y, height) {
-            for x in low.x as usize..end(high.x, width) {
-                let p = DVec2::new(x as f64, y as f64);
-                let weights = [
-                    (b - p).perp_dot(c - p) / area,
-                    (c - p).perp_dot(a - p) / area,
-                    (a - p).perp_dot(b - p) / area,
-                ];
-                if weights.iter().all(|&w| w >= 0.0) {
-                    let uv: DVec2 = (0..3).map(|i| triangle.uv[i] * weights[i]).sum();
-                    let at = uv * size - DVec2::splat(0.5);
-                    shades[y * width + x] = (texture.bilinear(at.x, at.y) + 0.5) as u8;
-                }
-            }
-        }
+        let texels = triangle.uv.map(|uv| (uv * size - 0.5).to_array());
+        for_each_sample(corners, texels, [width, height], |at, [u, v]| {
+            shades[at] = (texture.bilinear(u, v) + 0.5) as u8;
+        });
     }
     let image = Gray::from_fn(width / SAMPLES, height / SAMPLES, |x, y| {
         let rows = (0..SAMPLES).map(|s| (y * SAMPLES + s) * width + x * SAMPLES);

@@ -4,6 +4,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::model::mesh::Model;
+use crate::model::samples::for_each_sample;
 use deltille_core::camera::{Camera, Pose};
 use deltille_core::raster::Gray;
 
@@ -40,36 +41,18 @@ impl View {
             let Some(pixels) = all(seen.map(|v| self.camera.project(v).map(sample))) else {
                 continue;
             };
-            let [a, b, c] = pixels;
-            let area = (b - a).perp_dot(c - a);
-            let low = a.min(b).min(c).ceil().max(DVec2::ZERO);
-            let high = a.max(b).max(c).floor() + 1.0;
-            let columns = low.x as usize..(high.x.max(0.0) as usize).min(width);
-            for y in low.y as usize..(high.y.max(0.0) as usize).min(height) {
-                for x in columns.clone() {
-                    let p = DVec2::new(x as f64, y as f64);
-                    let weights = [
-                        (b - p).perp_dot(c - p) / area,
-                        (c - p).perp_dot(a - p) / area,
-                        (a - p).perp_dot(b - p) / area,
-                    ];
-                    if weights.iter().any(|&w| w < 0.0) {
-                        continue;
-                    }
-                    // Texture coordinates over z and 1/z are affine on the screen, so these are interpolated; 1/z
-                    // also determines which triangle is nearest.
-                    let per_z = [0, 1, 2].map(|i| weights[i] / seen[i].z);
-                    let inverse_z: f64 = per_z.iter().sum();
-                    let at = y * width + x;
-                    if inverse_z as f32 <= nearest[at] {
-                        continue;
-                    }
+            // 1/z and texture coordinates over z are affine on the screen; 1/z also determines which triangle is nearest.
+            let values = [0, 1, 2].map(|i| {
+                let texel = triangle.uv[i] * size / seen[i].z;
+                [1.0 / seen[i].z, texel.x, texel.y]
+            });
+            for_each_sample(pixels, values, [width, height], |at, [inverse_z, u, v]| {
+                if inverse_z as f32 > nearest[at] {
                     nearest[at] = inverse_z as f32;
-                    let sum: DVec2 = (0..3).map(|i| per_z[i] * triangle.uv[i]).sum();
-                    let texel = sum / inverse_z * size - 0.5;
-                    shades[at] = (texture.bilinear(texel.x, texel.y) + 0.5) as u8;
+                    let light = texture.bilinear(u / inverse_z - 0.5, v / inverse_z - 0.5);
+                    shades[at] = (light + 0.5) as u8;
                 }
-            }
+            });
         }
         Gray::from_fn(width / SAMPLES, height / SAMPLES, |x, y| {
             let rows = (0..SAMPLES).map(|s| (y * SAMPLES + s) * width + x * SAMPLES);

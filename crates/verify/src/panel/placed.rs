@@ -6,7 +6,7 @@ use glam::DVec2;
 
 use crate::document::page::Page;
 use crate::panel::affine_map::AffineMap;
-use crate::panel::text_area;
+use crate::panel::text_area::TextArea;
 use deltille_core::lattice::{Tile, Vertex};
 use deltille_core::statistics::median;
 use deltille_core::targets::Panel;
@@ -24,8 +24,8 @@ pub(crate) struct PlacedPanel<'a> {
     pub found_from_stated: AffineMap,
     /// Direction of the panel's x axis on the page.
     along: DVec2,
-    /// Corners of the rectangles around texts at their stated positions, px: their content is compared separately.
-    texts: Vec<[DVec2; 4]>,
+    /// The texts at their stated positions: their content is compared separately.
+    texts: Vec<TextArea>,
 }
 
 impl<'a> PlacedPanel<'a> {
@@ -45,7 +45,7 @@ impl<'a> PlacedPanel<'a> {
         let rectangle = |text: &SheetText| {
             let first = self.panel_from_page(text.at_mm);
             let inside = (left..right).contains(&first.x) && (lower..upper).contains(&first.y);
-            inside.then(|| text_area::rectangle_px(self.page, text))?
+            inside.then(|| TextArea::of(self.page, text))?
         };
         self.texts = layout.texts.iter().filter_map(rectangle).collect();
         self
@@ -53,13 +53,12 @@ impl<'a> PlacedPanel<'a> {
 
     /// Whether a text lies within `near_px` of a pixel.
     pub(crate) fn is_text(&self, px: DVec2, near_px: f64) -> bool {
-        self.texts.iter().any(|corners| {
-            (0..4).all(|i| {
-                let (a, b) = (corners[i], corners[(i + 1) % 4]);
-                // Counter-clockwise on the page, and therefore clockwise in the image.
-                (b - a).normalize_or_zero().perp_dot(px - a) <= near_px
-            })
-        })
+        self.texts.iter().any(|text| text.is_near(px, near_px))
+    }
+
+    /// Returns the texts in a rectangle of the image, and some beside it.
+    pub(crate) fn texts_within(&self, low: DVec2, high: DVec2) -> Vec<&TextArea> {
+        self.texts.iter().filter(|text| text.is_within(low, high)).collect()
     }
 
     /// Returns the stated page position of a point of the panel.

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use glam::DVec2;
+use rayon::prelude::*;
 
 use crate::document::page::MAX_INK_ERROR;
 use crate::finding::tile::TileFinding;
@@ -39,6 +40,20 @@ struct Tally {
 }
 
 impl Tally {
+    fn of(position: DVec2, is_wrong: bool) -> Self {
+        let mut tally = Self::default();
+        tally.count(position, is_wrong);
+        tally
+    }
+
+    fn count(&mut self, position: DVec2, is_wrong: bool) {
+        self.checked += 1;
+        if is_wrong {
+            self.wrong += 1;
+            self.moment += position;
+        }
+    }
+
     fn mostly_wrong(&self) -> bool {
         2 * self.wrong > self.checked
     }
@@ -63,10 +78,12 @@ impl<'a> PlacedPanel<'a> {
         let decoder = OnceCell::new();
         let mut report = TileReport::default();
         let expected = expected(self.panel, family, looks.as_ref());
-        for (&tile, expected) in &expected {
-            let tally = self.compare(tile, expected);
+        let tallies: Vec<Tallies> = (expected.par_iter())
+            .map(|(&tile, expected)| TileInImage::new(self, tile, expected).tallies())
+            .collect();
+        for ((&tile, expected), tallies) in expected.iter().zip(&tallies) {
             report.tiles += 1;
-            self.judge(tile, expected, &tally, family, &decoder, &mut report);
+            self.judge(tile, expected, tallies, family, &decoder, &mut report);
         }
         if report.findings.is_empty() {
             let is_smeared = self.page.smear_px > 0.0;
@@ -83,101 +100,11 @@ impl<'a> PlacedPanel<'a> {
         report
     }
 
-    /// Counts wrong pixels by cell; the key `None` is the area around the cells, or a plain tile.
-    fn compare(&self, tile: Tile, expected: &Expected) -> BTreeMap<Option<u32>, Tally> {
-        let [a, b, c] = self.frame_px(tile);
-        let (ab, ac) = (b - a, c - a);
-        let det = ab.perp_dot(ac);
-        let uv = |p: DVec2| DVec2::new(p.perp_dot(ac), ab.perp_dot(p)) / det;
-        let circle = |radius_px: f64| -> Vec<DVec2> {
-            (0..PROBES)
-                .map(|i| f64::from(i) * TAU / f64::from(PROBES))
-                .map(|angle| uv(radius_px * DVec2::from_angle(angle)))
-                .collect()
-        };
-        let (around, further) = (circle(EDGE_PX), circle(EDGE_PX + self.page.smear_px));
-        let most_at_edges = self.page.max_ink_error_at_edges();
-        let bit = |p: DVec2| expected.tag.as_ref().and_then(|tag| tag.looks.bit(p));
-        let black_at = |p: DVec2| expected.is_black_at(p);
-        let inside = |DVec2 { x: u, y: v }: DVec2| match self.panel.kind {
-            GridKind::Deltille => u >= 0.0 && v >= 0.0 && u + v <= 1.0,
-            GridKind::Checker => u >= 0.0 && v >= 0.0 && u <= 1.0 && v <= 1.0,
-        };
-        // Extent of a circle along the tile's heights, as fractions of them.
-        let reach = further.iter().fold(DVec2::ZERO, |most, off| most.max(off.abs()));
-        let slanting = further.iter().map(|off| off.element_sum().abs()).fold(0.0, f64::max);
-        let clear_of_edges = |p: DVec2| {
-            let near = p.cmpge(reach).all();
-            near && match self.panel.kind {
-                GridKind::Deltille => p.element_sum() <= 1.0 - slanting,
-                GridKind::Checker => p.cmple(1.0 - reach).all(),
-            }
-        };
-        let fourth = match self.panel.kind {
-            GridKind::Deltille => c,
-            GridKind::Checker => b + c - a,
-        };
-
-        let mut tallies = BTreeMap::<Option<u32>, Tally>::new();
-        let image = &self.page.image;
-        let low = a.min(b).min(c).min(fourth).ceil();
-        let high = a.max(b).max(c).max(fourth).floor() + 1.0;
-        let end = |high: f64, size: usize| (high.max(0.0) as usize).min(size);
-        for y in low.y.max(0.0) as usize..end(high.y, image.height()) {
-            for x in low.x.max(0.0) as usize..end(high.x, image.width()) {
-                let position = DVec2::new(x as f64, y as f64);
-                let p = uv(position - a);
-                if !inside(p) || self.is_text(position, 0.0) {
-                    continue;
-                }
-                let here = bit(p);
-                let black = black_at(p);
-                let found = 1.0 - f64::from(image.at(x, y)) / 255.0;
-                let error = (found - f64::from(u8::from(black))).abs();
-                // A plain tile has one colour wherever its edges are far enough away.
-                let is_far = expected.tag.is_none() && clear_of_edges(p);
-                let is_uniform = |around: &[DVec2], step: usize| {
-                    is_far
-                        || around.iter().step_by(step).all(|&off| {
-                            let q = p + off;
-                            inside(q) && black_at(q) == black
-                        })
-                };
-                // A circle alone would miss cells narrower than it.
-                let is_wrong = error > MAX_INK_ERROR
-                    && is_uniform(&around, 1)
-                    && (error > most_at_edges || is_uniform(&further, 1));
-                // Most pixels are right, and those need no closer examination.
-                if !is_wrong && !is_uniform(&around, COARSE) {
-                    continue;
-                }
-                let tally = tallies.entry(here).or_default();
-                tally.checked += 1;
-                if is_wrong {
-                    tally.wrong += 1;
-                    tally.moment += position;
-                }
-            }
-        }
-        // Cells too small to contain a pixel clear of their edges are judged by their centres.
-        if let Some(tag) = &expected.tag {
-            for bit in 0..tag.looks.cells.dimension().bits() {
-                tallies.entry(Some(bit)).or_insert_with(|| {
-                    let centre = tag.looks.cells.centre(bit, tag.looks.inset);
-                    let at = a + centre.x * ab + centre.y * ac;
-                    let wrong = (self.page.ink(at) > 0.5) != black_at(centre);
-                    Tally { checked: 1, wrong: usize::from(wrong), moment: at }
-                });
-            }
-        }
-        tallies
-    }
-
     fn judge(
         &self,
         tile: Tile,
         expected: &Expected,
-        tallies: &BTreeMap<Option<u32>, Tally>,
+        tallies: &Tallies,
         family: Option<&Family>,
         decoder: &OnceCell<Decoder>,
         report: &mut TileReport,
@@ -219,6 +146,158 @@ impl<'a> PlacedPanel<'a> {
                 area_mm2: n / self.page.px_per_mm.powi(2),
             });
         }
+    }
+}
+
+/// Counted pixels by cell; the key `None` is the area around the cells, or a plain tile.
+type Tallies = BTreeMap<Option<u32>, Tally>;
+
+/// A tile in the image.
+struct TileInImage<'a> {
+    placed: &'a PlacedPanel<'a>,
+    expected: &'a Expected<'a>,
+    /// Origin and sides of the tile coordinates, px.
+    a: DVec2,
+    ab: DVec2,
+    ac: DVec2,
+    /// Positions on circles around a pixel, in tile coordinates: within its smear, and within that of its page.
+    around: Vec<DVec2>,
+    further: Vec<DVec2>,
+    /// Extent of the larger circle along the sides, and along the third side of a triangle.
+    reach: DVec2,
+    slanting: f64,
+}
+
+/// A pixel of a tile.
+#[derive(Clone, Copy)]
+struct Pixel {
+    position: DVec2,
+    /// In tile coordinates.
+    at: DVec2,
+    /// Whether it should be black.
+    black: bool,
+    /// Difference of its ink.
+    error: f64,
+}
+
+impl<'a> TileInImage<'a> {
+    fn new(placed: &'a PlacedPanel<'a>, tile: Tile, expected: &'a Expected<'a>) -> Self {
+        let [a, b, c] = placed.frame_px(tile);
+        let mut tile = Self {
+            placed,
+            expected,
+            a,
+            ab: b - a,
+            ac: c - a,
+            around: Vec::new(),
+            further: Vec::new(),
+            reach: DVec2::ZERO,
+            slanting: 0.0,
+        };
+        let circle = |radius_px: f64| -> Vec<DVec2> {
+            (0..PROBES)
+                .map(|i| f64::from(i) * TAU / f64::from(PROBES))
+                .map(|angle| tile.uv(radius_px * DVec2::from_angle(angle)))
+                .collect()
+        };
+        (tile.around, tile.further) = (circle(EDGE_PX), circle(EDGE_PX + placed.page.smear_px));
+        let further = tile.further.iter();
+        tile.reach = further.clone().fold(DVec2::ZERO, |most, off| most.max(off.abs()));
+        tile.slanting = further.map(|off| off.element_sum().abs()).fold(0.0, f64::max);
+        tile
+    }
+
+    /// Returns a displacement in the image, px, in tile coordinates.
+    fn uv(&self, p: DVec2) -> DVec2 {
+        DVec2::new(p.perp_dot(self.ac), self.ab.perp_dot(p)) / self.ab.perp_dot(self.ac)
+    }
+
+    fn is_triangle(&self) -> bool {
+        self.placed.panel.kind == GridKind::Deltille
+    }
+
+    fn contains(&self, DVec2 { x: u, y: v }: DVec2) -> bool {
+        let is_below = if self.is_triangle() { u + v <= 1.0 } else { u <= 1.0 && v <= 1.0 };
+        u >= 0.0 && v >= 0.0 && is_below
+    }
+
+    /// Whether the tile has one colour around a position, as a plain tile has wherever its edges are far enough away.
+    fn is_far_from_edges(&self, at: DVec2) -> bool {
+        let is_below = match self.is_triangle() {
+            true => at.element_sum() <= 1.0 - self.slanting,
+            false => at.cmple(1.0 - self.reach).all(),
+        };
+        self.expected.tag.is_none() && at.cmpge(self.reach).all() && is_below
+    }
+
+    /// Whether the tile has the colour of a pixel at each `step`-th of these positions around it.
+    fn is_uniform(&self, pixel: &Pixel, around: &[DVec2], step: usize) -> bool {
+        self.is_far_from_edges(pixel.at)
+            || around.iter().step_by(step).all(|&off| {
+                let at = pixel.at + off;
+                self.contains(at) && self.expected.is_black_at(at) == pixel.black
+            })
+    }
+
+    /// Whether a pixel has the wrong colour although no edge is near.
+    fn is_wrong(&self, pixel: &Pixel) -> bool {
+        // A circle alone would miss cells narrower than it.
+        pixel.error > MAX_INK_ERROR
+            && self.is_uniform(pixel, &self.around, 1)
+            && (pixel.error > self.placed.page.max_ink_error_at_edges()
+                || self.is_uniform(pixel, &self.further, 1))
+    }
+
+    /// Returns the pixels of the tile that show no text.
+    fn pixels(&self) -> impl Iterator<Item = Pixel> {
+        let (a, ab, ac) = (self.a, self.ab, self.ac);
+        let corners = [a + ab, a + ac, if self.is_triangle() { a } else { a + ab + ac }];
+        let low = corners.into_iter().fold(a, DVec2::min);
+        let high = corners.into_iter().fold(a, DVec2::max);
+        let texts = self.placed.texts_within(low, high);
+        let image = &self.placed.page.image;
+        let range = |low: f64, high: f64, size: usize| {
+            low.ceil().max(0.0) as usize..((high.floor() + 1.0).max(0.0) as usize).min(size)
+        };
+        let columns = range(low.x, high.x, image.width());
+        let places = range(low.y, high.y, image.height())
+            .flat_map(move |y| columns.clone().map(move |x| (x, y)));
+        places.filter_map(move |(x, y)| {
+            let position = DVec2::new(x as f64, y as f64);
+            let at = self.uv(position - a);
+            if !self.contains(at) || texts.iter().any(|text| text.is_near(position, 0.0)) {
+                return None;
+            }
+            let black = self.expected.is_black_at(at);
+            let ink = 1.0 - f64::from(image.at(x, y)) / 255.0;
+            let error = (ink - f64::from(u8::from(black))).abs();
+            Some(Pixel { position, at, black, error })
+        })
+    }
+
+    /// Counts pixels by cell. Counts none if all are right.
+    fn tallies(&self) -> Tallies {
+        let mut tallies = Tallies::new();
+        if self.pixels().any(|pixel| self.is_wrong(&pixel)) {
+            let bit = |at: DVec2| self.expected.tag.as_ref().and_then(|tag| tag.looks.bit(at));
+            for pixel in self.pixels() {
+                let is_wrong = self.is_wrong(&pixel);
+                if is_wrong || self.is_uniform(&pixel, &self.around, COARSE) {
+                    tallies.entry(bit(pixel.at)).or_default().count(pixel.position, is_wrong);
+                }
+            }
+        }
+        // Cells too small to contain a pixel clear of their edges are judged by their centres.
+        if let Some(tag) = &self.expected.tag {
+            for bit in 0..tag.looks.cells.dimension().bits() {
+                let centre = tag.looks.cells.centre(bit, tag.looks.inset);
+                let position = self.a + centre.x * self.ab + centre.y * self.ac;
+                let is_black = self.placed.page.ink(position) > 0.5;
+                let is_wrong = is_black != self.expected.is_black_at(centre);
+                tallies.entry(Some(bit)).or_insert_with(|| Tally::of(position, is_wrong));
+            }
+        }
+        tallies
     }
 }
 

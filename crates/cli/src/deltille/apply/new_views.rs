@@ -165,7 +165,7 @@ impl NewViewsArgs {
             let only = OfCamera { option: "PHOTOGRAPHS".to_owned(), read };
             return Ok([(camera.name.clone(), only)].into());
         }
-        let (recording, camera) = (photographs.first().cloned(), cameras.clone());
+        let (recording, camera) = (photographs.clone(), cameras.clone());
         let of_rig = CamerasArgs { recording, camera, topic: topic.clone(), every, views };
         let names: Vec<&str> = before.cameras.iter().map(|camera| camera.name.as_str()).collect();
         let sources = of_rig.of_calibrated(&names)?;

@@ -17,7 +17,7 @@ use deltille::calibrate::{Calibration, Diagnosis, Estimate, Messages, Reference,
 use deltille::camera::Camera;
 use deltille::detect::{Detection, Detector, DetectorConfig};
 use deltille::export::kind::Kind;
-use deltille::export::pose;
+use deltille::export::pose::{self, PoseFormat};
 use deltille::export::sheet::Sheet;
 use deltille::frames::Frame;
 use deltille::limits::Limits;
@@ -52,8 +52,8 @@ pub struct Args {
     /// `reason` says why
     #[arg(long, alias = "every-picture")]
     all_images: bool,
-    /// Write to a file instead of standard output
-    #[arg(short, long, value_name = "FILE.ndjson")]
+    /// Write to a file instead of standard output: lines of JSON, or a .csv
+    #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     #[command(flatten)]
     limits: ImageLimits,
@@ -61,7 +61,7 @@ pub struct Args {
     overwrite: Overwrite,
 }
 
-/// Detects the target in each image and writes its pose as a line of JSON.
+/// Detects the target in each image and writes its pose as a line of JSON or CSV.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
     let printed = match args.grid.read_target()? {
@@ -84,12 +84,21 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
     }
     let finder = Finder { detector, camera, targets, sheet, limits };
-    let path =
-        args.output.as_ref().map(|path| output::file(path, "poses", "ndjson")).transpose()?;
-    if let Some(path) = &path {
-        args.overwrite.check(path, &Kind::of_schema(pose::SCHEMA))?;
-    }
-    let (mut lines, mut all, mut without, mut unread) = (String::new(), 0, 0, 0);
+    let (path, format) = match &args.output {
+        Some(path) => {
+            let path = output::file_of(path, "poses", &["ndjson", "csv"])?;
+            let ending = path.extension().unwrap_or_default().to_string_lossy();
+            let format = PoseFormat::of_extension(&ending).context("-o: no format of poses")?;
+            let kind = match format {
+                PoseFormat::Csv => Kind::of(format.head().as_bytes()),
+                _ => Kind::of_schema(pose::SCHEMA),
+            };
+            args.overwrite.check(&path, &kind)?;
+            (Some(path), format)
+        }
+        None => (None, PoseFormat::JsonLines),
+    };
+    let (mut lines, mut all, mut without, mut unread) = (format.head(), 0, 0, 0);
     let images = Images::of(&args.images)?;
     let options = args.recording.options(limits, &images)?;
     interrupt::keeps_results();
@@ -107,7 +116,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                 log!("error: {why}");
                 (without, unread) = (without + 1, unread + 1);
                 for target in finder.targets.iter().filter(|_| args.all_images) {
-                    of_image += &(pose::write_none(&name, time_ns, &target.name, &why) + "\n");
+                    of_image += &(format.line_without(&name, time_ns, &target.name, &why) + "\n");
                 }
             }
             Seen::Targets(found) => {
@@ -117,8 +126,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                     match found {
                         Ok(found) => {
                             let views = found.cameras.iter().flat_map(|camera| &camera.views);
-                            let line =
-                                |view| pose::write_line(&found, view, time_ns, target) + "\n";
+                            let line = |view| format.line(&found, view, time_ns, target) + "\n";
                             of_image += &views.map(line).collect::<String>();
                         }
                         Err(why) => {
@@ -127,7 +135,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                                 log!("{}: {}{why}", image.display(), finder.of_target(target));
                             }
                             if args.all_images {
-                                let line = pose::write_none(&name, time_ns, &target.name, &why);
+                                let line = format.line_without(&name, time_ns, &target.name, &why);
                                 of_image += &(line + "\n");
                             }
                         }

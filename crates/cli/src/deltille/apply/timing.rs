@@ -111,6 +111,7 @@ impl Args {
             "--camera: {} has one camera; give its recording without --camera",
             self.camera.display()
         );
+        let recording = recording.into_iter().collect();
         let of_rig = CamerasArgs { recording, camera, topic, every: 1, views: None };
         let mut sources = of_rig.of_calibrated(&names)?;
         sources.sort_by_key(|source| names.iter().position(|name| *name == source.name));

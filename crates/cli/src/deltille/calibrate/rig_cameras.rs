@@ -19,7 +19,7 @@ use deltille::targets::Name;
 pub struct CamerasArgs {
     /// A recording of all cameras, an MCAP file or a bag of ROS 1 or 2, with --topic for each camera
     #[arg(value_name = "RECORDING", conflicts_with = "camera")]
-    pub recording: Option<PathBuf>,
+    pub recording: Vec<PathBuf>,
     /// Camera and its video, recording, folder of photographs or folder of detections, such as left=left.mp4; repeat for each
     /// camera. The first camera defines the rig's frame. Frames of recordings are combined by their time stamps, photographs and
     /// detections by their file names
@@ -73,12 +73,18 @@ impl CamerasArgs {
     /// Returns the cameras. A rig has several, unless it is used to measure a target. Of a calibrated rig, `known` are the names
     /// of its cameras; otherwise it is empty.
     pub fn sources(&self, known: &[&str], is_one_enough: bool) -> anyhow::Result<Vec<Source>> {
-        let sources = match &self.recording {
-            Some(recording) => self.in_one(recording, known)?,
-            None => self.in_several()?,
+        let sources = match self.recording.as_slice() {
+            [] => self.in_several()?,
+            [recording] => self.in_one(recording, known)?,
+            [first, second, ..] => {
+                let [first, second] = [first, second].map(|path| path.display());
+                bail!(
+                    "{first} and {second}: name the camera of each, such as --camera left={first} --camera right={second}"
+                )
+            }
         };
         if sources.len() < 2 && !is_one_enough {
-            let option = if self.recording.is_some() { "--topic" } else { "--camera" };
+            let option = if self.camera.is_empty() { "--topic" } else { "--camera" };
             bail!(
                 "{option}: a rig needs at least two cameras, or one with --refine-target; use `deltille calibrate` for one camera"
             );

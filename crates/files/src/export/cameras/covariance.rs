@@ -1,11 +1,11 @@
 //! The covariance of all unknowns of a calibration as JSON (schema `deltille/covariance/1`), CSV, or arrays of NumPy.
 
-use std::borrow::Cow;
 use std::fmt::Write as _;
 
 use serde::Serialize;
 
 use crate::export::detections::npy::{float64, texts};
+use crate::export::writing::cell::quoted;
 use crate::export::writing::zip::zip;
 use deltille_calibrate::{JointCovariance, JointUnknown, Matrix};
 use deltille_core::json;
@@ -86,14 +86,6 @@ fn csv(of: &JointCovariance) -> String {
 /// An entry of a matrix; `None` beyond its end, where the observed covariance is not known.
 fn entry(matrix: &Matrix, i: usize, j: usize) -> Option<f64> {
     (i.max(j) < matrix.rows()).then(|| matrix[(i, j)])
-}
-
-/// A field of a line of CSV (RFC 4180): names of frames come from names of files.
-fn quoted(name: &str) -> Cow<'_, str> {
-    match name.contains([',', '"', '\n', '\r']) {
-        true => format!("\"{}\"", name.replace('"', "\"\"")).into(),
-        false => name.into(),
-    }
 }
 
 /// The product of two units.

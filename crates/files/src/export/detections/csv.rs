@@ -10,6 +10,7 @@ use std::fmt::Write;
 use glam::{DVec2, DVec3};
 
 use super::positions::Positions;
+use crate::export::writing::cell::quoted;
 use deltille_core::detection::Detection;
 use deltille_core::lattice::GridKind;
 use deltille_core::targets::Target;
@@ -59,14 +60,6 @@ pub fn write(detection: &Detection, targets: &[&Target]) -> String {
         }
     }
     text
-}
-
-/// A text as a cell: in quotes if it contains a separator (RFC 4180).
-fn quoted(text: &str) -> String {
-    match text.contains([',', '"', '\n', '\r']) {
-        true => format!("\"{}\"", text.replace('"', "\"\"")),
-        false => text.to_owned(),
-    }
 }
 
 /// Reads points, px, one `x,y` per line; a header line `x,y` and empty lines are skipped.
