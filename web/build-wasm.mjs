@@ -12,7 +12,7 @@ import { gzipSync } from "node:zlib";
 const web = dirname(fileURLToPath(import.meta.url));
 const root = dirname(web);
 const target = process.env.CARGO_TARGET_DIR ?? join(root, "target");
-const built = join(target, "wasm32-unknown-unknown", "web", "deltille_web.wasm");
+const built = join(target, "wasm32-unknown-unknown", "web", "examples");
 const all = ["make", "prove", "photo", "see", "solve"];
 
 const parts = process.argv.slice(2);
@@ -25,12 +25,15 @@ if (unknown !== undefined) {
 const cargo = (more, ...given) => execFileSync("cargo", given, { cwd: root, stdio: "inherit", env: { ...process.env, ...more } });
 cargo({}, "build", "--quiet", "-p", "deltille-bindgen");
 const simd = { RUSTFLAGS: `${process.env.RUSTFLAGS ?? ""} -C target-feature=+simd128`.trim() };
-for (const part of parts.length > 0 ? parts : all) {
-  cargo(simd, "build", "--profile", "web", "--target", "wasm32-unknown-unknown", "-p", "deltille-web", "--no-default-features", "--features", part);
+const wanted = parts.length > 0 ? parts : all;
+const examples = wanted.flatMap((part) => ["--example", part]);
+cargo(simd, "build", "--profile", "web", "--target", "wasm32-unknown-unknown", "-p", "deltille-web", ...examples);
+for (const part of wanted) {
   const folder = join(web, "pkg", part);
   rmSync(folder, { recursive: true, force: true });
   mkdirSync(folder, { recursive: true });
-  execFileSync(join(target, "debug", "deltille-bindgen"), [built, folder, "deltille"], { stdio: "inherit" });
+  const named = [join(built, `${part}.wasm`), folder, "deltille"];
+  execFileSync(join(target, "debug", "deltille-bindgen"), named, { stdio: "inherit" });
   const made = join(folder, "deltille_bg.wasm");
   console.log(`${part}: ${(statSync(made).size / 1e6).toFixed(2)} MB, ${(gzipSync(readFileSync(made)).length / 1e3).toFixed(0)} KB gzipped`);
 }

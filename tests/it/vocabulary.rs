@@ -78,7 +78,7 @@ fn sources(root: &Path) -> Vec<PathBuf> {
         "python/src",
         "python/deltille",
         "web/src",
-        "web/wasm/src",
+        "web/wasm",
     ]
     .map(|folder| root.join(folder))
     .to_vec();

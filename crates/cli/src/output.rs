@@ -316,9 +316,9 @@ pub fn folder_of(path: &Path) -> &Path {
 
 /// Extensions of files that these programs write, and of images and videos. A new folder with such a name was probably
 /// meant to be a file.
-const OF_FILES: &str = "3mf avi bmp c cameramodel csv dsc dxf eps glb gltf gz h html jpeg jpg json mkv mov mp4 mtl ndjson npy npz \
-                        obj orpc parquet pdf ply png ps py rs sdf step stl stp svg tif tiff toml txt urdf usd usda usdz \
-                        webp xml yaml yml zip";
+const OF_FILES: &str = "3mf ai avi bmp c cameramodel csv doc docx dsc dwg dxf eps gif glb gltf gz h heic html iges igs jpeg \
+                        jpg json md mkv mov mp4 mtl ndjson npy npz obj odt orpc parquet pdf ply png ps psd py rs sdf step stl \
+                        stp svg tif tiff toml txt urdf usd usda usdz webp xlsx xml yaml yml zip";
 
 /// Whether an extension is one of these, or that of another kind of file.
 fn is_of_file(ending: &str, endings: &[&str]) -> bool {

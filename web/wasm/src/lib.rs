@@ -1,40 +1,23 @@
 //! The library in a browser: turns settings and dropped files into targets and results.
 //!
-//! | module | purpose |
+//! | file in `modules` | purpose |
 //! |---|---|
 //! | `make` | makes targets and their files from settings, except for PNG pages and meshes |
 //! | `prove` | makes PNG pages and meshes, reads files back and compares them with their target, reads logos |
 //! | `photo` | decodes photographs and draws detections over them |
 //! | `see` | detects corners in grey values and webcam frames |
 //! | `solve` | calibrates a camera from corners and writes its report |
-//! | `codes` | figures of tag families, decoding and error rates |
-//! | `family` | sets the family of a target from its file |
-//! | `files` | converts files to JavaScript values |
-//! | `errors` | converts errors of the library to JavaScript exceptions |
+//! | `codes` | figures of tag families, decoding and error rates: part of `make` |
 //!
-//! The crate is built once for each of the first five, as modules that a page loads on demand; `codes` is part of `make`.
+//! A page loads the modules on demand. This crate is what they share: [`errors`] converts errors of the library to JavaScript
+//! exceptions, [`family`] sets the family of a target from its file, and [`files`] converts files to JavaScript values.
+//!
 //! Values are passed as JSON in the library's own formats, files as bytes. No module contains the families: the page fetches
 //! the family file that it needs.
 
-#![allow(unreachable_pub, reason = "the page is the only user of this interface")]
-
-#[cfg(feature = "make")]
-pub mod codes;
-mod errors;
-#[cfg(any(feature = "prove", feature = "see"))]
-mod family;
-#[cfg(any(feature = "make", feature = "prove"))]
-mod files;
-#[cfg(feature = "make")]
-pub mod make;
-#[cfg(feature = "photo")]
-pub mod photo;
-#[cfg(feature = "prove")]
-pub mod prove;
-#[cfg(feature = "see")]
-pub mod see;
-#[cfg(feature = "solve")]
-pub mod solve;
+pub mod errors;
+pub mod family;
+pub mod files;
 
 use wasm_bindgen::prelude::*;
 

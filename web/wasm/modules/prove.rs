@@ -1,5 +1,7 @@
 //! Makes PNG pages and meshes, reads files back and compares them with their target, and reads logos.
 
+#![allow(unreachable_pub, reason = "the page is the only user of this interface")]
+
 use deltille_files::export::artifacts::{Making, make};
 use deltille_files::logo;
 use deltille_layout::Printing;
@@ -7,9 +9,9 @@ use deltille_verify::{Artifact, Verifier};
 use js_sys::{Array, Uint8Array};
 use wasm_bindgen::prelude::*;
 
-use crate::errors::{Raise, one_line};
-use crate::family::set_family;
-use crate::files::in_array;
+use deltille_web::errors::{Raise, one_line};
+use deltille_web::family::set_family;
+use deltille_web::files::in_array;
 
 /// Returns the files of the target of a description in a format, as alternating names and bytes. `family` is the content of
 /// the target's family file, `dpi` the resolution of PNG pages.

@@ -6,7 +6,7 @@ use deltille_core::family::{
 };
 use wasm_bindgen::prelude::*;
 
-use crate::errors::Raise;
+use deltille_web::errors::Raise;
 
 /// Returns the bundled families as JSON: names, tilings, bits, distances, numbers of codes.
 #[wasm_bindgen]

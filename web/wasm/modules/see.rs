@@ -1,5 +1,7 @@
 //! Detects corners in grey values and webcam frames.
 
+#![allow(unreachable_pub, reason = "the page is the only user of this interface")]
+
 use deltille_core::detection::{Detection, InkEstimate, Watch};
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
@@ -9,8 +11,8 @@ use deltille_detect::{Detector, DetectorConfig, Tracker};
 use deltille_files::export::{csv, detection, orpc};
 use wasm_bindgen::prelude::*;
 
-use crate::errors::Raise;
-use crate::family::set_family;
+use deltille_web::errors::Raise;
+use deltille_web::family::set_family;
 
 /// An image for detection.
 #[wasm_bindgen]
@@ -170,7 +172,7 @@ impl Found {
 
     /// Returns sentences that explain why nothing was found or labelled.
     pub fn reasons(&self) -> Vec<String> {
-        self.detection.reasons.iter().map(crate::errors::one_line).collect()
+        self.detection.reasons.iter().map(deltille_web::errors::one_line).collect()
     }
 }
 

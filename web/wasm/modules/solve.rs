@@ -1,5 +1,7 @@
 //! Calibrates a camera from corners and writes its report.
 
+#![allow(unreachable_pub, reason = "the page is the only user of this interface")]
+
 use deltille_calibrate::{
     self, Calibration, HoldStatus, HoldTracker, Intrinsics, Model, NextView, Reference, Source,
     View, views,
@@ -15,7 +17,7 @@ use deltille_files::report::{Report, Survey, camera_notes};
 use deltille_layout::Printing;
 use wasm_bindgen::prelude::*;
 
-use crate::errors::{Raise, one_line};
+use deltille_web::errors::{Raise, one_line};
 
 /// A calibrated camera with its files and report.
 #[wasm_bindgen]

@@ -1,5 +1,7 @@
 //! Decodes photographs and draws detections over them.
 
+#![allow(unreachable_pub, reason = "the page is the only user of this interface")]
+
 use std::path::Path;
 
 use deltille_core::raster::{AnyGray, Intensity};
@@ -8,7 +10,7 @@ use deltille_files::limits::Limits;
 use deltille_files::photograph;
 use wasm_bindgen::prelude::*;
 
-use crate::errors::Raise;
+use deltille_web::errors::Raise;
 
 /// Maximum number of pixels of an image: the browser keeps several copies in memory.
 const MAX_PIXELS: u64 = 64_000_000;

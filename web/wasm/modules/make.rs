@@ -1,5 +1,9 @@
 //! Makes targets and their files from settings.
 
+#![allow(unreachable_pub, reason = "the page is the only user of this interface")]
+
+mod codes;
+
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
 use deltille_core::targets::{
@@ -17,8 +21,8 @@ use js_sys::Array;
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::prelude::*;
 
-use crate::errors::Raise;
-use crate::files::in_array;
+use deltille_web::errors::Raise;
+use deltille_web::files::in_array;
 
 /// Edge of a square of a ChArUco board, side of a tag of an AprilGrid, and spacing of circles, mm: the defaults of the
 /// programs, like the dictionary.
