@@ -174,7 +174,7 @@ export function calibrate(): HTMLElement {
     const sure = figures.projection_sd_px;
     result.replaceChildren(
       el("p", { class: said.length > 0 ? "facts" : "good" }, text.rms(figures.rms_px.toFixed(4), figures.views)),
-      sure ? el("p", {}, text.sure(sure.toFixed(4))) : "",
+      sure ? el("p", {}, text.sure(sure.toFixed(4), figures.is_observed)) : "",
       seen.assumedEdge === null ? "" : el("p", { class: "warning" }, text.assumedEdge(seen.assumedEdge)),
       said.length > 0 ? el("ul", {}, ...said.map((sentence) => el("li", {}, sentence))) : el("p", {}, text.nothing),
       el("table", {}, el("thead", {}, el("tr", {}, ...[text.parameter, text.value, text.deviation].map((head) => el("th", { scope: "col" }, head)))), el("tbody", {}, ...rows)),

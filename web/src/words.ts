@@ -249,7 +249,7 @@ export const words = {
     solving: "Calibrating…",
     outdated: "The images, the model or the print scale changed after this calibration: calibrate again.",
     rms: (rms: string, views: number) => `Reprojection error: ${rms} px RMS per axis over ${views} views.`,
-    sure: (px: string) => `Projection uncertainty of distant points: ${px} px (1σ), from the scatter between views and the accuracy of the board.`,
+    sure: (px: string, isObserved: boolean) => `Projection uncertainty of distant points: ${px} px (1σ), from ${isObserved ? "the scatter between views and the accuracy of the board" : "the noise of the corners alone: there are too few views for their scatter"}.`,
     parameter: "Parameter",
     value: "Value",
     deviation: "1σ",

@@ -79,6 +79,8 @@ export type Figures = {
   values: number[];
   sd: (number | null)[];
   projection_sd_px: number | null;
+  /** Whether it comes from the scatter between views, not only from the noise of the corners. */
+  is_observed: boolean;
 };
 export type Result = { figures: Figures; said: string[]; files: { name: string; text: string }[] };
 

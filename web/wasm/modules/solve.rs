@@ -77,13 +77,14 @@ impl Solved {
             .extend(camera_notes(read.iter().map(|(_, found)| found)).map(|notes| (0, notes)));
         let noise_sd = || found.parameters.iter().map(|parameter| parameter.sd).collect();
         let observed_sd = Some(found.observed_sd()).filter(|all| all.iter().any(Option::is_some));
-        let projection_sd_px = |source| found.projection_sd_px(None, source);
+        let observed_px = found.projection_sd_px(None, Source::Observed);
+        let noise_px = || found.projection_sd_px(None, Source::Noise);
         let figures = serde_json::json!({
             "rms_px": found.rms_px, "views": found.views.len(), "corners": found.corner_count(),
             "names": found.camera.parameter_names(), "values": found.camera.parameters(),
             "sd": observed_sd.unwrap_or_else(noise_sd),
-            "projection_sd_px":
-                projection_sd_px(Source::Observed).or_else(|| projection_sd_px(Source::Noise)),
+            "is_observed": observed_px.is_some(),
+            "projection_sd_px": observed_px.or_else(noise_px),
         });
         let json = calibration::write(&estimate, &diagnoses, print, Residuals::Omitted, &poses)
             .unwrap_or_default();
