@@ -5,20 +5,16 @@ use glam::{DVec2, DVec3};
 
 use crate::document::page::Page;
 use crate::model::mesh::{Model, Triangle};
-use crate::model::samples::for_each_sample;
+use crate::model::samples::{SAMPLES, for_each_sample, pixels};
 use crate::verifier::Verifier;
 use deltille_core::polygon;
 use deltille_core::polygon::rectangle;
-use deltille_core::raster::Gray;
 use deltille_core::targets::{Panel, TargetSpec};
 use deltille_layout::Placement;
 
 /// Largest distance of the triangles of a face from the plane of its panel, and of their corners from its outline,
 /// mm.
 const IN_PLANE_MM: f64 = 0.25;
-
-/// Samples of the texture per pixel of the page along each axis.
-const SAMPLES: usize = 2;
 
 /// A triangle on the front of a face.
 pub(super) struct Front<'a> {
@@ -79,11 +75,7 @@ pub(super) fn face_page(
             shades[at] = (texture.bilinear(u, v) + 0.5) as u8;
         });
     }
-    let image = Gray::from_fn(width / SAMPLES, height / SAMPLES, |x, y| {
-        let rows = (0..SAMPLES).map(|s| (y * SAMPLES + s) * width + x * SAMPLES);
-        let sum: u32 = rows.flat_map(|at| &shades[at..at + SAMPLES]).map(|&v| u32::from(v)).sum();
-        (sum / (SAMPLES * SAMPLES) as u32) as u8
-    });
+    let image = pixels(&shades, width);
     let (smear_px, left_px) = (1.0 + texel_px, 0.0);
     let page = Page { width_mm, height_mm, px_per_mm, image, smear_px, texel_px, left_px };
     (page, Placement { panel: panel.id, angle_rad: 0.0, origin_mm: DVec2::new(-left, -lower) })

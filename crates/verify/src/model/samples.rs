@@ -1,6 +1,11 @@
-//! The samples of an image within a triangle.
+//! The samples of an image within a triangle, and their reduction to pixels.
 
 use glam::DVec2;
+
+use deltille_core::raster::Gray;
+
+/// Samples per pixel along each axis.
+pub(crate) const SAMPLES: usize = 2;
 
 /// Part of a sample by which a triangle is extended, so that no sample falls between two triangles with a common side.
 const OVERLAP: f64 = 1e-9;
@@ -52,6 +57,16 @@ pub(crate) fn for_each_sample<const N: usize>(
             visit(y * width + x, std::array::from_fn(|n| from[n] + x as f64 * by[n]));
         }
     }
+}
+
+/// Returns the image of which these are the samples, in rows of `width`: each pixel is the mean of its samples.
+pub(crate) fn pixels(samples: &[u8], width: usize) -> Gray<u8> {
+    let height = samples.len() / width;
+    Gray::from_fn(width / SAMPLES, height / SAMPLES, |x, y| {
+        let rows = (0..SAMPLES).map(|s| (y * SAMPLES + s) * width + x * SAMPLES);
+        let sum: u32 = rows.flat_map(|at| &samples[at..at + SAMPLES]).map(|&v| u32::from(v)).sum();
+        (sum / (SAMPLES * SAMPLES) as u32) as u8
+    })
 }
 
 #[cfg(test)]

@@ -4,12 +4,9 @@
 use glam::{DVec2, DVec3};
 
 use crate::model::mesh::Model;
-use crate::model::samples::for_each_sample;
+use crate::model::samples::{SAMPLES, for_each_sample, pixels};
 use deltille_core::camera::{Camera, Pose};
 use deltille_core::raster::Gray;
-
-/// Samples per pixel along each axis.
-const SAMPLES: usize = 2;
 
 /// Grey value around the mesh, between the black and white of the print.
 const BACKGROUND: u8 = 128;
@@ -38,7 +35,7 @@ impl View {
             if normal.dot(seen[0]) >= 0.0 {
                 continue;
             }
-            let Some(pixels) = all(seen.map(|v| self.camera.project(v).map(sample))) else {
+            let Some(corners) = all(seen.map(|v| self.camera.project(v).map(sample))) else {
                 continue;
             };
             // 1/z and texture coordinates over z are affine on the screen; 1/z also determines which triangle is nearest.
@@ -46,7 +43,7 @@ impl View {
                 let texel = triangle.uv[i] * size / seen[i].z;
                 [1.0 / seen[i].z, texel.x, texel.y]
             });
-            for_each_sample(pixels, values, [width, height], |at, [inverse_z, u, v]| {
+            for_each_sample(corners, values, [width, height], |at, [inverse_z, u, v]| {
                 if inverse_z as f32 > nearest[at] {
                     nearest[at] = inverse_z as f32;
                     let light = texture.bilinear(u / inverse_z - 0.5, v / inverse_z - 0.5);
@@ -54,12 +51,7 @@ impl View {
                 }
             });
         }
-        Gray::from_fn(width / SAMPLES, height / SAMPLES, |x, y| {
-            let rows = (0..SAMPLES).map(|s| (y * SAMPLES + s) * width + x * SAMPLES);
-            let sum: u32 =
-                rows.flat_map(|at| &shades[at..at + SAMPLES]).map(|&v| u32::from(v)).sum();
-            (sum / (SAMPLES * SAMPLES) as u32) as u8
-        })
+        pixels(&shades, width)
     }
 
     /// Returns the first intersection of a pixel's ray with a front-facing triangle of the mesh, in

@@ -91,7 +91,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             let format = PoseFormat::of_extension(&ending).context("-o: no format of poses")?;
             let kind = match format {
                 PoseFormat::Csv => Kind::of(format.head().as_bytes()),
-                _ => Kind::of_schema(pose::SCHEMA),
+                PoseFormat::JsonLines => Kind::of_schema(pose::SCHEMA),
             };
             args.overwrite.check(&path, &kind)?;
             (Some(path), format)

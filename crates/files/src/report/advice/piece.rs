@@ -1,3 +1,5 @@
+//! A piece of advice and its importance.
+
 /// Importance of a piece of advice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
