@@ -129,9 +129,9 @@ impl Combination<3, 0> for WithPixel<Deltille, 3> {
     #[inline(always)]
     fn at(&self, h: [f32; 3], _: [Shade<3>; 0]) -> Shade<3> {
         let mut shade = deltille(h);
-        for (k, h) in h.into_iter().enumerate() {
-            let (square, slope) = (h * h, shade.slopes[k]);
-            shade.boxed[k] = h * (square - 3.0) * slope;
+        for k in 0..3 {
+            let (square, slope) = (h[k] * h[k], shade.slopes[k]);
+            shade.boxed[k] = h[k] * (square - 3.0) * slope;
             shade.f += self.strengths[k] * shade.boxed[k];
             shade.slopes[k] -= self.strengths[k] * ((square - 6.0) * square + 3.0) * slope;
         }

@@ -50,20 +50,28 @@ impl<P: Pattern<3>> Pattern<3> for WithTriangle<P> {
     }
 }
 
+impl Triangle {
+    /// Adds the term of a pair of edges. The pair is constant, so that the loop over pixels is vectorised.
+    #[inline(always)]
+    fn add_pair<const PAIR: usize>(&self, h: [f32; 3], shade: &mut Shade<3>) {
+        let [i, j] = PAIRS[PAIR];
+        // Signs of the triangle's sides: − + −, or + − +.
+        let weight = if PAIR == 1 { 0.5 } else { -0.5 } * self.sign;
+        let both = self.pairs[PAIR].checker([h[i] * self.narrower[i], h[j] * self.narrower[j]]);
+        shade.f += weight * both.f;
+        shade.slopes[i] += weight * both.slopes[0] * self.narrower[i];
+        shade.slopes[j] += weight * both.slopes[1] * self.narrower[j];
+        shade.correlations[PAIR] = weight * both.correlations[0];
+    }
+}
+
 impl Combination<3, 1> for Triangle {
     #[inline(always)]
     fn at(&self, h: [f32; 3], [mut shade]: [Shade<3>; 1]) -> Shade<3> {
-        let weight = 0.5 * self.sign;
-        shade.f += weight;
-        for (p, [i, j]) in PAIRS.into_iter().enumerate() {
-            // Signs of the triangle's sides: − + −, or + − +.
-            let weight = if p == 1 { weight } else { -weight };
-            let both = self.pairs[p].checker([h[i] * self.narrower[i], h[j] * self.narrower[j]]);
-            shade.f += weight * both.f;
-            shade.slopes[i] += weight * both.slopes[0] * self.narrower[i];
-            shade.slopes[j] += weight * both.slopes[1] * self.narrower[j];
-            shade.correlations[p] = weight * both.correlations[0];
-        }
+        shade.f += 0.5 * self.sign;
+        self.add_pair::<0>(h, &mut shade);
+        self.add_pair::<1>(h, &mut shade);
+        self.add_pair::<2>(h, &mut shade);
         shade
     }
 }

@@ -153,7 +153,10 @@ pub(crate) fn combine<const K: usize, const N: usize, C: Combination<K, N>>(
     shades: &mut Shades<K>,
 ) {
     for i in 0..distances.count.min(BLOCK) {
-        let of: [Shade<K>; N] = std::array::from_fn(|n| simpler[n].at(i));
+        let mut of = [Shade::new(0.0, [0.0; K]); N];
+        for (of, simpler) in of.iter_mut().zip(simpler) {
+            *of = simpler.at(i);
+        }
         shades.set(i, combination.at(column(&distances.h, i), of));
     }
 }
