@@ -71,17 +71,16 @@ pub(crate) struct Halo {
 
 impl<const K: usize, P: Pattern<K>> Pattern<K> for Haloed<P> {
     fn shade(&self, distances: &Distances<K>, shades: &mut Shades<K>) {
-        let (mut sharp, mut wide) = (Shades::NONE, Shades::NONE);
-        let narrower = self.halo.narrower;
-        self.pattern.shade(distances, &mut sharp);
+        let (mut wide, narrower) = (Shades::NONE, self.halo.narrower);
+        self.pattern.shade(distances, shades);
         self.wide.shade(&distances.map(|h| h.map(|h| h * narrower)), &mut wide);
-        combine(&self.halo, distances, [&sharp, &wide], shades);
+        combine(&self.halo, distances, [&wide], shades);
     }
 }
 
-impl<const K: usize> Combination<K, 2> for Halo {
+impl<const K: usize> Combination<K, 1> for Halo {
     #[inline(always)]
-    fn at(&self, _: [f32; K], [sharp, wide]: [Shade<K>; 2]) -> Shade<K> {
+    fn at(&self, _: [f32; K], sharp: Shade<K>, [wide]: [Shade<K>; 1]) -> Shade<K> {
         let both = |sharp: f32, wide: f32| sharp + self.strength * (sharp - wide);
         Shade {
             f: both(sharp.f, wide.f),
@@ -127,11 +126,11 @@ where
 
 impl Combination<3, 0> for WithPixel<Deltille, 3> {
     #[inline(always)]
-    fn at(&self, h: [f32; 3], _: [Shade<3>; 0]) -> Shade<3> {
+    fn at(&self, h: [f32; 3], _: Shade<3>, _: [Shade<3>; 0]) -> Shade<3> {
         let mut shade = deltille(h);
-        for k in 0..3 {
-            let (square, slope) = (h[k] * h[k], shade.slopes[k]);
-            shade.boxed[k] = h[k] * (square - 3.0) * slope;
+        for (k, h) in h.into_iter().enumerate() {
+            let (square, slope) = (h * h, shade.slopes[k]);
+            shade.boxed[k] = h * (square - 3.0) * slope;
             shade.f += self.strengths[k] * shade.boxed[k];
             shade.slopes[k] -= self.strengths[k] * ((square - 6.0) * square + 3.0) * slope;
         }
@@ -141,7 +140,7 @@ impl Combination<3, 0> for WithPixel<Deltille, 3> {
 
 impl<const NODES: usize> Combination<2, 0> for WithPixel<Orthant<NODES>, 2> {
     #[inline(always)]
-    fn at(&self, h: [f32; 2], _: [Shade<2>; 0]) -> Shade<2> {
+    fn at(&self, h: [f32; 2], _: Shade<2>, _: [Shade<2>; 0]) -> Shade<2> {
         let still = self.edges.checker(h);
         let mut shade = still;
         // The slope of an edge changes by `mixed` with the distance from the other.
@@ -202,7 +201,7 @@ impl Pattern<3> for SweptDeltille {
 
 impl Combination<3, 0> for SweptDeltille {
     #[inline(always)]
-    fn at(&self, h: [f32; 3], _: [Shade<3>; 0]) -> Shade<3> {
+    fn at(&self, h: [f32; 3], _: Shade<3>, _: [Shade<3>; 0]) -> Shade<3> {
         let [f1, slope1, way1] = self.edge(0, h[0]);
         let [f2, slope2, way2] = self.edge(1, h[1]);
         let [f3, slope3, way3] = self.edge(2, h[2]);
@@ -230,22 +229,23 @@ const PARTS: [f32; 2] = [0.75, 0.25];
 
 impl<P: Pattern<2>> Pattern<2> for SweptChecker<P> {
     fn shade(&self, distances: &Distances<2>, shades: &mut Shades<2>) {
-        let mut four = [const { Shades::NONE }; 4];
-        for (part, pair) in PARTS.into_iter().zip(four.as_chunks_mut::<2>().0) {
+        let [mut ahead, mut behind_within, mut ahead_within] = [const { Shades::NONE }; 3];
+        let parts = [(&mut *shades, &mut ahead), (&mut behind_within, &mut ahead_within)];
+        for (part, (behind, ahead)) in PARTS.into_iter().zip(parts) {
             let [x, y] = self.way.map(|way| part * way);
-            self.pattern.shade(&distances.map(|[a, b]| [a - x, b - y]), &mut pair[0]);
-            self.pattern.shade(&distances.map(|[a, b]| [a + x, b + y]), &mut pair[1]);
+            self.pattern.shade(&distances.map(|[a, b]| [a - x, b - y]), behind);
+            self.pattern.shade(&distances.map(|[a, b]| [a + x, b + y]), ahead);
         }
-        combine(&MeanOfParts, distances, four.each_ref(), shades);
+        combine(&MeanOfParts, distances, [&ahead, &behind_within, &ahead_within], shades);
     }
 }
 
 /// The mean of four parts of a motion, in the order of [`PARTS`].
 struct MeanOfParts;
 
-impl Combination<2, 4> for MeanOfParts {
+impl Combination<2, 3> for MeanOfParts {
     #[inline(always)]
-    fn at(&self, _: [f32; 2], [a, b, c, d]: [Shade<2>; 4]) -> Shade<2> {
+    fn at(&self, _: [f32; 2], a: Shade<2>, [b, c, d]: [Shade<2>; 3]) -> Shade<2> {
         let (outer, inner) = (mean_of_pair(a, b, PARTS[0]), mean_of_pair(c, d, PARTS[1]));
         Shade {
             f: 0.5 * (outer.f + inner.f),

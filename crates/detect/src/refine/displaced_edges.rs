@@ -44,9 +44,8 @@ pub(crate) struct Triangle {
 
 impl<P: Pattern<3>> Pattern<3> for WithTriangle<P> {
     fn shade(&self, distances: &Distances<3>, shades: &mut Shades<3>) {
-        let mut edges = Shades::NONE;
-        self.edges.shade(distances, &mut edges);
-        combine(&self.triangle, distances, [&edges], shades);
+        self.edges.shade(distances, shades);
+        combine(&self.triangle, distances, [], shades);
     }
 }
 
@@ -65,9 +64,9 @@ impl Triangle {
     }
 }
 
-impl Combination<3, 1> for Triangle {
+impl Combination<3, 0> for Triangle {
     #[inline(always)]
-    fn at(&self, h: [f32; 3], [mut shade]: [Shade<3>; 1]) -> Shade<3> {
+    fn at(&self, h: [f32; 3], mut shade: Shade<3>, _: [Shade<3>; 0]) -> Shade<3> {
         shade.f += 0.5 * self.sign;
         self.add_pair::<0>(h, &mut shade);
         self.add_pair::<1>(h, &mut shade);
@@ -149,15 +148,14 @@ impl<P> WithSpot<P> {
 
 impl<P: Pattern<3>> Pattern<3> for WithSpot<P> {
     fn shade(&self, distances: &Distances<3>, shades: &mut Shades<3>) {
-        let mut edges = Shades::NONE;
-        self.edges.shade(distances, &mut edges);
-        combine(&self.spot, distances, [&edges], shades);
+        self.edges.shade(distances, shades);
+        combine(&self.spot, distances, [], shades);
     }
 }
 
-impl Combination<3, 1> for Spot {
+impl Combination<3, 0> for Spot {
     #[inline(always)]
-    fn at(&self, h: [f32; 3], [mut shade]: [Shade<3>; 1]) -> Shade<3> {
+    fn at(&self, h: [f32; 3], mut shade: Shade<3>, _: [Shade<3>; 0]) -> Shade<3> {
         let (a, form) = (&self.weights, &self.form);
         let c = a[0] * h[0] + a[1] * h[1] + a[2] * h[2];
         let away: [f32; 3] = std::array::from_fn(|k| h[k] - self.centroid[k] * c);
@@ -203,16 +201,16 @@ impl<P: Pattern<2>> Pattern<2> for Parted<P> {
     fn shade(&self, distances: &Distances<2>, shades: &mut Shades<2>) {
         let [d1, d2] = self.displaced.0;
         let d2 = self.displaced.sign() * d2;
-        let (mut ahead, mut behind) = (Shades::NONE, Shades::NONE);
-        self.edges.shade(&distances.map(|[a, b]| [a + d1, b + d2]), &mut ahead);
+        let mut behind = Shades::NONE;
+        self.edges.shade(&distances.map(|[a, b]| [a + d1, b + d2]), shades);
         self.edges.shade(&distances.map(|[a, b]| [a - d1, b - d2]), &mut behind);
-        combine(&self.displaced, distances, [&ahead, &behind], shades);
+        combine(&self.displaced, distances, [&behind], shades);
     }
 }
 
-impl Combination<2, 2> for Displaced {
+impl Combination<2, 1> for Displaced {
     #[inline(always)]
-    fn at(&self, h: [f32; 2], [ahead, behind]: [Shade<2>; 2]) -> Shade<2> {
+    fn at(&self, h: [f32; 2], ahead: Shade<2>, [behind]: [Shade<2>; 1]) -> Shade<2> {
         let (by, sign) = (self.0, self.sign());
         let (mut f, mut slopes) = (0.5 * (ahead.f + behind.f), mean(ahead.slopes, behind.slopes));
         let mut shifts = [

@@ -135,29 +135,30 @@ pub(crate) trait Pattern<const K: usize> {
     fn shade(&self, distances: &Distances<K>, shades: &mut Shades<K>);
 }
 
-/// The brightness at a pixel, given that of N simpler patterns there.
+/// The brightness at a pixel, given a simpler pattern there and N others.
 ///
 /// A trait, because its method is compiled for the processor of the loop into which it is inlined. Closures that are
 /// called twice are not.
 pub(crate) trait Combination<const K: usize, const N: usize> {
     /// Returns the brightness at distances h from the edges.
-    fn at(&self, h: [f32; K], simpler: [Shade<K>; N]) -> Shade<K>;
+    fn at(&self, h: [f32; K], simpler: Shade<K>, others: [Shade<K>; N]) -> Shade<K>;
 }
 
-/// Combines N patterns at the pixels of a block.
+/// Combines a pattern with N others at the pixels of a block. `shades` has its values before, which patterns of edges alone
+/// ignore, and those of the combination afterwards.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(crate) fn combine<const K: usize, const N: usize, C: Combination<K, N>>(
     combination: &C,
     distances: &Distances<K>,
-    simpler: [&Shades<K>; N],
+    others: [&Shades<K>; N],
     shades: &mut Shades<K>,
 ) {
     for i in 0..distances.count.min(BLOCK) {
-        let mut of = [Shade::new(0.0, [0.0; K]); N];
-        for (of, simpler) in of.iter_mut().zip(simpler) {
-            *of = simpler.at(i);
+        let mut there = [Shade::new(0.0, [0.0; K]); N];
+        for (there, other) in there.iter_mut().zip(others) {
+            *there = other.at(i);
         }
-        shades.set(i, combination.at(column(&distances.h, i), of));
+        shades.set(i, combination.at(column(&distances.h, i), shades.at(i), there));
     }
 }
 
