@@ -118,7 +118,9 @@ pub fn find(path: &Path) -> Result<PathBuf, TargetReadError> {
 }
 
 /// Reads a target with its sheets: a `.dsc` by its extension, otherwise JSON; from a folder, its only description. If a `.dsc` has no poses of its boards, they are
-/// read from the `.tp` with the same stem. Leftovers of killed runs in the folder are cleaned up first.
+/// read from the `.tp` with the same stem. Leftovers of killed runs in the folder are cleaned up first. A family that does not
+/// ship with the program is read from the path in the description, which may be relative to the current folder, to that of the
+/// description or to the one around it, or else from beside the description.
 ///
 /// # Errors
 /// Returns an error if the file cannot be read, or does not describe a target.
@@ -144,7 +146,13 @@ pub fn read(path: &Path, limits: &Limits) -> Result<Printing, TargetReadError> {
             _ => Ok(target.into()),
         };
     }
-    Printing::from_json(&text).map_err(|error| TargetReadError::Json { path: path_of(), error })
+    let read = Printing::from_json(&text);
+    let mut printing = read.map_err(|error| TargetReadError::Json { path: path_of(), error })?;
+    if printing.target.family().is_err() {
+        // What needs the codes will name what is missing.
+        let _ = set_family_near(&mut printing.target, None, folder.unwrap_or(Path::new("")));
+    }
+    Ok(printing)
 }
 
 /// Returns the board described at a path if a new text of the file would no longer describe its prints, which would make them
@@ -216,13 +224,25 @@ pub enum TargetFamilyError {
 /// Returns an error if the family cannot be read, has other codes, or has codes that are closer than claimed, or if a family is
 /// given for a target without tags.
 pub fn set_family(target: &mut Target, given: Option<&str>) -> Result<(), TargetFamilyError> {
+    if given.is_none() && target.family().is_ok() {
+        return Ok(());
+    }
+    set_family_near(target, given, Path::new(""))
+}
+
+/// Sets the family like [`set_family`], for a target that is described in this folder.
+fn set_family_near(
+    target: &mut Target,
+    given: Option<&str>,
+    folder: &Path,
+) -> Result<(), TargetFamilyError> {
     let name = target.name.to_string();
     let other = |why| TargetFamilyError::Other { target: name, why };
     match (&target.family, given) {
         (None, None) => Ok(()),
         (None, Some(_)) => Err(other(OtherFamily::NoTags)),
         (Some(wanted), given) => {
-            let family = family(target, wanted, given)?;
+            let family = family(target, wanted, given, folder)?;
             target.set_family(&family).map_err(other)
         }
     }
@@ -233,34 +253,47 @@ fn family(
     target: &Target,
     wanted: &FamilyRef,
     given: Option<&str>,
+    folder: &Path,
 ) -> Result<Family, TargetFamilyError> {
     // If the target also has other tags, a given file with square tags is the family of its square tags.
     let given = given.map(|given| family_file::resolve(given).map_err(TargetFamilyError::Given));
     let given = given.transpose()?;
+    let near = |path: Option<&str>| path.map(|path| near(path, folder));
     let Some(squares) = &wanted.squares else {
-        return one_family(target, wanted, target.spec.family(), given);
+        return one_family(target, wanted, near(target.spec.family()), given);
     };
     let (of_squares, others): (Option<Family>, Option<Family>) = match given {
         Some(given) if given.kind() == GridKind::Checker => (Some(given), None),
         given => (None, given),
     };
-    let family = one_family(target, wanted, target.spec.family(), others)?;
-    let squares = one_family(target, squares, target.spec.square_family(), of_squares)?;
+    let family = one_family(target, wanted, near(target.spec.family()), others)?;
+    let squares = one_family(target, squares, near(target.spec.square_family()), of_squares)?;
     Ok(family.with_squares(squares))
+}
+
+/// Returns the first existing file that a path in a description in this folder may mean, or the path itself.
+fn near(path: &str, folder: &Path) -> PathBuf {
+    let name = Path::new(path).file_name().unwrap_or_default();
+    let places = [folder.join(path), folder.join("..").join(path), folder.join(name)];
+    let here = PathBuf::from(path);
+    match here.exists() {
+        true => here,
+        false => places.into_iter().find(|place| place.is_file()).unwrap_or(here),
+    }
 }
 
 /// Returns the family with the given name, or the one at the path if only that one matches.
 fn named_family(
     target: &Target,
     wanted: &FamilyRef,
-    path: Option<&str>,
+    path: Option<PathBuf>,
 ) -> Result<Family, FamilyFileError> {
     let is_it = |family: &Family| target.check_family(wanted, family).is_ok();
     let of_name = family_file::resolve(&wanted.name);
     if of_name.as_ref().is_ok_and(is_it) {
         return of_name;
     }
-    match path.map(family_file::resolve) {
+    match path.map(|path| family_file::resolve(&path.to_string_lossy())) {
         Some(Ok(family)) if of_name.is_err() || is_it(&family) => Ok(family),
         Some(Err(error)) if of_name.is_err() => Err(error),
         _ => of_name,
@@ -272,7 +305,7 @@ fn named_family(
 fn one_family(
     target: &Target,
     wanted: &FamilyRef,
-    path: Option<&str>,
+    path: Option<PathBuf>,
     given: Option<Family>,
 ) -> Result<Family, TargetFamilyError> {
     let family = match given {

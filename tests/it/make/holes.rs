@@ -2,6 +2,7 @@
 
 use assert_cmd::Command;
 use deltille::artwork::{CutLayer, CutPath, to_laser};
+use deltille::camera::Camera;
 use deltille::export::svg;
 use deltille::family::Family;
 use deltille::lattice::Vertex;
@@ -164,4 +165,30 @@ fn a_family_may_have_the_name_of_a_shipped_one() {
     let board = "board --rows 6 --cols 7 --edge 20mm --family own/d16h5.json --hole 1mm --svg";
     deltille(folder.path(), board).success();
     deltille(folder.path(), "verify board.json").success();
+}
+
+/// A description names the family file relative to the folder in which the board was made.
+#[test]
+fn own_families_are_found_from_every_folder() {
+    let made = tempfile::tempdir().unwrap();
+    let at = made.path();
+    holed(at);
+    let board = "board --rows 6 --cols 7 --edge 20mm --name desk --family families/holed.json";
+    deltille(at, &format!("{board} --no-verify -o desk")).success();
+    std::fs::write(at.join("lens.yaml"), Camera::pinhole(640, 480, 1.0).to_yaml()).unwrap();
+    for (i, eye) in ["20,-150,250", "250,60,250", "120,60,330", "-50,150,200"].iter().enumerate() {
+        let view = format!("render desk/desk.json --camera lens.yaml --eye {eye}");
+        deltille(at, &format!("{view} -o photos/{i}.png")).success();
+    }
+    let elsewhere = tempfile::tempdir().unwrap();
+    let from = elsewhere.path();
+    let input = format!("{0}/photos --target {0}/desk", at.display());
+    deltille(from, &format!("detect {input} -o corners")).success();
+    let calibrate = format!("calibrate {input} --model radtan -o camera.yaml --force");
+    deltille(from, &calibrate).success();
+    std::fs::rename(at.join("families/holed.json"), from.join("renamed.json")).unwrap();
+    let refused = deltille(from, &calibrate).failure();
+    let said = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
+    assert!(said.contains("set the family with --family"), "{said}");
+    deltille(from, &format!("{calibrate} --family renamed.json")).success();
 }

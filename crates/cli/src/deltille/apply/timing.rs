@@ -40,6 +40,9 @@ pub struct Args {
     /// Target description: the .json written with the target, or a .dsc
     #[arg(long, value_name = "FILE")]
     target: PathBuf,
+    /// Family file, if the target uses a family that does not ship with the program
+    #[arg(long)]
+    family: Option<String>,
     /// Use --target even if the camera was calibrated with a board with the same tags but a different size
     #[arg(long)]
     assume_target: bool,
@@ -60,7 +63,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         args.overwrite.check(path, &Kind::of_schema(timing_file::SCHEMA))?;
     }
     let limits = args.limits.limits();
-    let printing = target_file::read_placed(&args.target, &limits).context("--target")?;
+    let mut printing = target_file::read_placed(&args.target, &limits).context("--target")?;
+    target_file::set_given_family(std::slice::from_mut(&mut printing), args.family.as_deref())?;
     let known = camera_file::read_estimate("CAMERA", &args.camera)?;
     let targets = std::slice::from_ref(&printing.target);
     camera_file::check_or_note(&args.camera, &known.calibrated_with, targets, args.assume_target)?;

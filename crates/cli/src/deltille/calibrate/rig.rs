@@ -49,6 +49,9 @@ pub struct Args {
     /// relative to each other (no camera needs to see more than one)
     #[arg(long, required_unless_present = "grid", value_name = "FILE")]
     target: Vec<PathBuf>,
+    /// Family file, if the target uses a family that does not ship with the program
+    #[arg(long, requires = "target")]
+    family: Option<String>,
     #[command(flatten)]
     grid: GridArgs,
     /// Camera model of every camera, see `deltille calibrate`
@@ -106,10 +109,11 @@ pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
         args.stem
     );
     let limits = args.limits.limits();
-    let (printed, grid) = match args.grid.read_target()? {
+    let (mut printed, grid) = match args.grid.read_target()? {
         Some((grid, target)) => (vec![target.into()], Some(grid)),
         None => (target_file::read_all_placed(&args.target, &limits).context("--target")?, None),
     };
+    target_file::set_given_family(&mut printed, args.family.as_deref())?;
     let targets: Vec<Target> = printed.iter().map(|one| one.target.clone()).collect();
     let reference = sightings::reference(grid, &targets);
     let sheet = args.sheet.read(&limits, &reference.identities(), &printed)?;

@@ -59,7 +59,7 @@ fn read_each(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<Printing>
 }
 
 /// Sets the family of each target; a given file applies to the targets that name its family.
-pub fn set_families(targets: &mut [Target], given: Option<&str>) -> anyhow::Result<()> {
+pub fn set_families(targets: &mut [&mut Target], given: Option<&str>) -> anyhow::Result<()> {
     if let [only] = targets {
         return set_family(only, given);
     }
@@ -69,7 +69,7 @@ pub fn set_families(targets: &mut [Target], given: Option<&str>) -> anyhow::Resu
         target.family.as_ref().is_some_and(|family| Some(&family.name) == name.as_ref())
     };
     if let Some(name) = &name
-        && !targets.iter().any(names_it)
+        && !targets.iter().any(|target| names_it(target))
     {
         bail!("--family: no target has tags of {name}");
     }
@@ -77,6 +77,12 @@ pub fn set_families(targets: &mut [Target], given: Option<&str>) -> anyhow::Resu
         let given = given.filter(|_| names_it(target));
         set_family(target, given)
     })
+}
+
+/// Sets the family of targets if it is given: detections from files need no codes.
+pub fn set_given_family(printed: &mut [Printing], given: Option<&str>) -> anyhow::Result<()> {
+    let mut targets: Vec<&mut Target> = printed.iter_mut().map(|one| &mut one.target).collect();
+    given.map_or(Ok(()), |given| set_families(&mut targets, Some(given)))
 }
 
 /// Sets the family of a target, see [`target_file::set_family`].
