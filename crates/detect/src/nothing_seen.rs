@@ -20,12 +20,13 @@ pub(super) fn nothing_found<const N: usize>(pyramid: &Pyramid, corners: usize) -
         let to_one = 1.0 / PYRAMID_FULL_SCALE;
         Pyramid::new(&level.map(|v| f32::from(v) * to_one), PYRAMID_LEVELS - 1, MIN_LEVEL_SIDE)
     });
-    let others = half.map_or(0, |half| match kind::<N>() {
-        GridKind::Deltille => most_corners(&SaddleFinder::<CHECKER>::new(), &half),
-        GridKind::Checker => most_corners(&SaddleFinder::<DELTILLE>::new(), &half),
+    let (others, edges) = half.map_or((0, 0.0), |half| match kind::<N>() {
+        GridKind::Deltille => (most_corners(&SaddleFinder::<CHECKER>::new(), &half), 2.0),
+        GridKind::Checker => (most_corners(&SaddleFinder::<DELTILLE>::new(), &half), 3.0),
     });
     if others >= MIN_OTHER_CORNERS {
-        return Reason::new(ReasonKind::OtherTiling, [("corners", others as f64)]);
+        let figures = [("corners", others as f64), ("edges", edges)];
+        return Reason::new(ReasonKind::OtherTiling, figures);
     }
     let reason = why::nothing_found(pyramid, corners);
     if matches!(reason.kind, ReasonKind::NoCorners | ReasonKind::NoGrid)

@@ -183,6 +183,10 @@ macro_rules! whole {
                 title: Option<&str>,
                 overwrite: bool,
             ) -> PyResult<PathBuf> {
+                if path.extension().is_none_or(|end| end != "html") {
+                    let what = format!("{} must end in .html", path.display());
+                    return Err(raised::FileError::new_err(what));
+                }
                 let solved = $solved.clone();
                 solved.check_whole()?;
                 let usual = if $is_rig { "rig" } else { "camera" };

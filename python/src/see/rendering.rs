@@ -229,8 +229,11 @@ pub fn render<'py>(
             let middle = places.sum::<DVec3>() / own.all().count().max(1) as f64;
             Pose::looking_at(place("eye", eye)?, look_at.unwrap_or(middle.to_array()), up)?
         }
-        _ => {
-            let what = "pass pose or eye (the position of the camera), not both";
+        (Some(_), Some(_)) => {
+            return Err(wrong("pose and eye are mutually exclusive".to_owned()));
+        }
+        (None, None) => {
+            let what = "pass pose, or eye, the position of the camera in mm";
             return Err(wrong(what.to_owned()));
         }
     };

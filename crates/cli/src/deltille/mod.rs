@@ -129,7 +129,8 @@ enum Command {
     /// Test whether a camera or a rig is still as calibrated, from a few photographs of a target
     ///
     /// The answer is `unchanged` (exit code 0), `changed` with what has changed (1), or `cannot tell` with what is
-    /// missing (3). The camera file must contain uncertainties: the .json of `deltille calibrate` or `deltille rig`.
+    /// missing (3). The camera file must contain uncertainties: the .json of `deltille calibrate` or `deltille rig`. Errors of a
+    /// printed board hide small changes, unless --measure-target was given there.
     #[command(after_help = examples::CHECK)]
     Check(check::Args),
     /// Measure known lengths with a camera or a rig, and judge their errors against a limit

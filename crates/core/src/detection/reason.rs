@@ -89,7 +89,7 @@ pub enum ReasonKind {
     NoGrid,
     /// Tiles are too small for a certain grid: `edge_px`, `needed_edge_px`.
     TooSmall,
-    /// The corners belong to the other tiling: `corners`.
+    /// The corners belong to the other tiling: `corners`, and the number of `edges` that cross in each.
     OtherTiling,
     /// Tag cells are too small or too blurred to be read: `bit_px`, `blur_px`, `needed_bit_px`. If
     /// the last is missing, the contrast of the cells is too low for the noise.
@@ -193,11 +193,15 @@ impl fmt::Display for Reason {
                 figure("needed_edge_px")
             ),
             ReasonKind::OtherTiling => {
+                // Detections of earlier versions do not state the edges.
+                let [found, expected] = match figure("edges") {
+                    3.0 => ["triangles", "squares"],
+                    _ => ["squares", "triangles"],
+                };
+                let corners = count("corners", "corner");
                 write!(
                     f,
-                    "found {} of squares where triangles are expected, or the reverse: check the kind of the \
-                     target",
-                    count("corners", "corner")
+                    "found {corners} of {found} where {expected} are expected: check the kind of the target"
                 )
             }
             ReasonKind::UnreadableTags if !self.figures.contains_key("needed_bit_px") => write!(

@@ -21,8 +21,7 @@ pub enum FamilyError {
     Json(#[from] serde_json::Error),
     /// The schema or its version is not supported.
     #[error(
-        "field `schema` is `{found}`, but this version reads `{}`: generate the file again with \
-         {FamilyToJson}",
+        "field `schema` is `{found}`, but that of a family file is `{}`: generate one with {FamilyToJson}",
         crate::family::SCHEMA
     )]
     Schema {

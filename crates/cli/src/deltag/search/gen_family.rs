@@ -226,6 +226,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             proof_of(&certificate, distance),
             family.fingerprint()
         );
+        let shipped = Family::shipped(family.name());
+        if shipped.is_ok_and(|shipped| shipped.fingerprint() == family.fingerprint()) {
+            log!("note: the same codes ship with the program as {}", family.name());
+        }
     }
     Ok(exit)
 }

@@ -63,6 +63,7 @@ fn describe(found: &Check) -> String {
         of.iter().map(ToString::to_string).collect::<Vec<_>>().join(between)
     };
     let of = format!("{}, {}", counted(found.views, "view"), counted(found.corners, "corner"));
+    // A change of one quantity may be hidden in the p-value of all quantities together.
     let p = found.p_value.map_or(String::new(), |p| format!(", {}", p_value(p)));
     let mut text = match found.answer {
         Answer::Unchanged => format!("unchanged: {of}{p}\n"),
@@ -78,7 +79,7 @@ fn describe(found: &Check) -> String {
             _ => {
                 let or: String =
                     found.or.iter().map(|quantity| format!(", or {quantity}")).collect();
-                format!("changed: {}{or}: {of}{p}\n", names(&found.changed, " and "))
+                format!("changed: {}{or}: {of}\n", names(&found.changed, " and "))
             }
         },
         _ => found.missing.iter().map(|why| format!("cannot tell: {why}\n")).collect(),

@@ -8,7 +8,7 @@ use anyhow::{Context, ensure};
 
 use super::compensation::{self, prepare};
 use super::report_page::{check_images, note_missing};
-use super::sightings::{Sightings, SightingsArgs};
+use super::sightings::{Empty, Sightings, SightingsArgs};
 use super::solving::{
     Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out, pose_uncertainty,
     projection_uncertainty, richest, sample, with_constraints, without_outliers,
@@ -122,8 +122,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let is_assumed = args.sightings.assumes_target();
         camera_file::check_or_note(known, &known_with, &targets, is_assumed)?;
     }
-    for picture in &empty {
-        log!("{}: excluded: no board found", picture.display());
+    for Empty { path, reason } in &empty {
+        let why = reason.as_ref().map_or(String::new(), |reason| format!(": {reason}"));
+        log!("{}: excluded: no board found{why}", path.display());
+    }
+    if empty.len() > views.len() {
+        let all = counted(empty.len() + views.len(), "image");
+        log!("warning: the target was found in only {} of {all}", views.len());
     }
     if let Some(folder) = &args.images {
         note_missing(folder, &views);

@@ -19,7 +19,7 @@ use deltille::calibrate::{
     Calibration, Excluded, Intrinsics, PanelPrior, Reason, Reference, UntaggedGrid, View, ViewSet,
     views,
 };
-use deltille::detect::{Detection, InkEstimate};
+use deltille::detect::{self, Detection, InkEstimate};
 use deltille::export::calibration::Print;
 use deltille::export::sheet::{self, Sheet};
 use deltille::lattice::GridKind;
@@ -42,6 +42,9 @@ pub struct SightingsArgs {
     /// relative to each other, whose relative poses are estimated
     #[arg(long, value_name = "FILE")]
     target: Vec<PathBuf>,
+    /// Family file, if the target uses a family that does not ship with the program
+    #[arg(long, requires = "target")]
+    family: Option<String>,
     #[command(flatten)]
     grid: GridArgs,
     /// Use --target even if the detections name another target
@@ -149,8 +152,8 @@ pub struct Sightings {
     pub calibration: Calibration,
     /// The targets, with nominal corner positions.
     pub printed: Vec<Printing>,
-    /// Detection files without a view.
-    pub empty: Vec<PathBuf>,
+    /// Images or detection files that show no target.
+    pub empty: Vec<Empty>,
     /// Detections that do not belong to the target.
     pub left_out: Vec<Excluded>,
     /// Known properties of the print.
@@ -209,6 +212,7 @@ impl SightingsArgs {
             true => Vec::new(),
             false => target_file::read_all_placed(&self.target, &limits).context("--target")?,
         };
+        target_file::set_given_family(&mut printed, self.family.as_deref())?;
         let targets: Vec<Target> = printed.iter().map(|one| one.target.clone()).collect();
         ensure!(
             !measure_target || targets.len() < 2,
@@ -433,11 +437,19 @@ fn as_option_error(error: SheetUseError) -> anyhow::Error {
     }
 }
 
+/// An image that shows no target.
+pub struct Empty {
+    /// The image, or the file of its detection.
+    pub path: PathBuf,
+    /// The reason, if it is known.
+    pub reason: Option<detect::Reason>,
+}
+
 /// Content of detections.
 pub struct Read {
     pub views: Vec<View>,
-    /// Detection files that show no target.
-    pub empty: Vec<PathBuf>,
+    /// Images or detection files that show no target.
+    pub empty: Vec<Empty>,
     /// Detections that do not belong to the target.
     pub left_out: Vec<Excluded>,
     /// Joint estimate of the ink spread from all images.
@@ -485,7 +497,11 @@ pub fn views_of(given: Given, reference: &Reference, is_assumed: bool) -> anyhow
     for (index, out) in &left_out {
         log!("warning: excluded: {}: {}", files[*index].display(), out.reason);
     }
-    let empty = empty.into_iter().map(|index| files[index].clone()).collect();
+    let empty = empty.into_iter().map(|index| {
+        let reason = detections[index].1.reasons.first().cloned();
+        Empty { path: files[index].clone(), reason }
+    });
+    let empty = empty.collect();
     let left_out = left_out.into_iter().map(|(_, out)| out).collect();
     let ink = ink_of(&detections, reference);
     Ok(Read { views, empty, left_out, ink, detections })

@@ -33,7 +33,8 @@ pub struct Args {
     #[arg(long, value_name = "RX,RY,RZ,TX,TY,TZ", value_parser = numbers::<6>,
           allow_hyphen_values = true, conflicts_with = "eye")]
     pose: Option<[f64; 6]>,
-    /// Position of the camera in the target frame in mm, instead of --pose
+    /// Position of the camera in the target frame in mm, instead of --pose. The origin of a deltille board (row 0, column 0 of
+    /// the lattice) lies to the left of its corners
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true)]
     eye: Option<[f64; 3]>,
     /// Point that the camera at --eye looks at, mm [default: the middle of all corners]

@@ -92,8 +92,9 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     }
     if report.print.scale.is_none() {
         let text = format!(
-            "All distances scale with the print: measure both check bars of the sheet and set {PrintScale}. Focal \
-             lengths and distortion do not change if both bars have the same scale error."
+            "All distances scale with the print: measure both check bars of the sheet and set {PrintScale} to their \
+             measured length divided by the nominal one. Focal lengths and distortion do not change if both bars have the \
+             same scale error."
         );
         add(Weight::Hint, text);
     }

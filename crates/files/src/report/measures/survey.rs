@@ -161,10 +161,12 @@ fn surveyed(camera: &Camera, view: &ViewEstimate, planar: bool) -> SurveyedView 
 /// which the board is farther away, rad; `None` if the lens has no ray there.
 fn lean(camera: &Camera, pose: &Pose, place: DVec2) -> Option<[f64; 2]> {
     let normal = pose.rotation * DVec3::Z;
-    let sight = camera.unproject(place)?.direction.normalize();
+    let ray = camera.unproject(place)?;
+    let (sight, distance) = (ray.direction, pose.translation.length());
     // The normal of a board that faces the camera is opposite to the line of sight. The board leans to its far side.
     let leant = normal.reject_from_normalized(sight);
-    let step = camera.project(sight + STEP * leant)? - camera.project(sight)?;
+    let at = |direction: DVec3| camera.project(ray.origin + distance * direction);
+    let step = at(sight + STEP * leant)? - at(sight)?;
     Some([normal.angle_between(-sight), step.to_angle()])
 }
 
