@@ -258,21 +258,21 @@ fn family(
     // If the target also has other tags, a given file with square tags is the family of its square tags.
     let given = given.map(|given| family_file::resolve(given).map_err(TargetFamilyError::Given));
     let given = given.transpose()?;
-    let near = |path: Option<&str>| path.map(|path| near(path, folder));
+    let file = |path: Option<&str>| path.map(|path| file_near(path, folder));
     let Some(squares) = &wanted.squares else {
-        return one_family(target, wanted, near(target.spec.family()), given);
+        return one_family(target, wanted, file(target.spec.family()), given);
     };
     let (of_squares, others): (Option<Family>, Option<Family>) = match given {
         Some(given) if given.kind() == GridKind::Checker => (Some(given), None),
         given => (None, given),
     };
-    let family = one_family(target, wanted, near(target.spec.family()), others)?;
-    let squares = one_family(target, squares, near(target.spec.square_family()), of_squares)?;
+    let family = one_family(target, wanted, file(target.spec.family()), others)?;
+    let squares = one_family(target, squares, file(target.spec.square_family()), of_squares)?;
     Ok(family.with_squares(squares))
 }
 
 /// Returns the first existing file that a path in a description in this folder may mean, or the path itself.
-fn near(path: &str, folder: &Path) -> PathBuf {
+fn file_near(path: &str, folder: &Path) -> PathBuf {
     let name = Path::new(path).file_name().unwrap_or_default();
     let places = [folder.join(path), folder.join("..").join(path), folder.join(name)];
     let here = PathBuf::from(path);

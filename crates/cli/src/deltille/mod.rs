@@ -130,7 +130,7 @@ enum Command {
     ///
     /// The answer is `unchanged` (exit code 0), `changed` with what has changed (1), or `cannot tell` with what is
     /// missing (3). The camera file must contain uncertainties: the .json of `deltille calibrate` or `deltille rig`. Errors of a
-    /// printed board hide small changes, unless --measure-target was given there.
+    /// printed board hide small changes unless it was measured (--measure-target).
     #[command(after_help = examples::CHECK)]
     Check(check::Args),
     /// Measure known lengths with a camera or a rig, and judge their errors against a limit

@@ -75,8 +75,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     for (source, given) in sources.iter().zip(given) {
         let of = known.cameras.iter().find(|of| known.cameras.len() == 1 || of.name == source.name);
         let of = of.context("no camera")?;
-        let read = sightings::views_of(given, &reference, args.assume_target)
-            .with_context(|| source.option.clone())?;
+        let read = sightings::views_of(given, &reference, args.assume_target);
+        let read = read.and_then(sightings::shown).with_context(|| source.option.clone())?;
         let times =
             compensation::times_ns(&read.detections).with_context(|| source.option.clone())?;
         let mut views = read.views;

@@ -91,7 +91,7 @@ pub struct BoardSettings {
     #[arg(long, help_heading = TAGS)]
     #[serde(skip_serializing_if = "is_false")]
     tag_ids: bool,
-    /// Id of the first board [default: 0]
+    /// Id of the first board [default: 0]; --first-id sets the ids of its tags
     #[arg(long, value_name = "ID", value_parser = whole(0..=u32::MAX))]
     board_id: Option<u32>,
     /// Number of boards, identical except for their ids; each on its own sheet, or several per sheet with --pack
