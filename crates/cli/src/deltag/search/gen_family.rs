@@ -227,7 +227,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             family.fingerprint()
         );
         let shipped = Family::shipped(family.name());
-        if shipped.is_ok_and(|shipped| shipped.fingerprint() == family.fingerprint()) {
+        if is_whole && shipped.is_ok_and(|shipped| shipped.fingerprint() == family.fingerprint()) {
             log!("note: the same codes ship with the program as {}", family.name());
         }
     }
