@@ -120,9 +120,7 @@ impl Camera {
         let wrong = |what: String| Err(errors::camera(what));
         let rows = arrays::rows_of::<3>("matrix", matrix).unwrap_or_default();
         let [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]] = rows[..] else {
-            return wrong(
-                "matrix: expected 3 × 3 numbers: fx, 0, cx; 0, fy, cy; 0, 0, 1".to_owned(),
-            );
+            return wrong("matrix: expected fx, 0, cx; 0, fy, cy; 0, 0, 1 (3 × 3)".to_owned());
         };
         if ![fx, fy, cx, cy].iter().all(|value| value.is_finite()) {
             return wrong("matrix: expected finite numbers".to_owned());
