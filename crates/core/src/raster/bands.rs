@@ -7,8 +7,6 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::{Gray, Intensity};
-
 /// Pixels per band: a few milliseconds of work, so that the cost of scheduling is negligible.
 /// Smaller images are not
 /// divided; usually there are many of them to share between threads.
@@ -39,44 +37,13 @@ pub fn bands<T: Send>(
 }
 
 /// Fills bands of an image's pixels with `work`, which receives the first row of each band.
-pub(super) fn fill_bands<T: Send>(
-    pixels: &mut [T],
-    width: usize,
-    work: impl Fn(usize, &mut [T]) + Sync,
-) {
+pub fn fill_bands<T: Send>(pixels: &mut [T], width: usize, work: impl Fn(usize, &mut [T]) + Sync) {
     let height = band_rows(width);
     if pixels.len() <= height * width {
         return work(0, pixels);
     }
     let bands = pixels.par_chunks_mut(height * width).enumerate();
     bands.for_each(|(i, band)| work(i * height, band));
-}
-
-/// Creates an image whose rows `fill` writes, given their numbers and the memory of their band.
-pub(super) fn image_of_rows<T: Intensity, M>(
-    width: usize,
-    height: usize,
-    memory: impl Fn() -> M + Sync,
-    fill: impl Fn(&mut M, usize, &mut [T]) + Sync,
-) -> Gray<T> {
-    if height <= band_rows(width) {
-        // Appending rows takes less time than filling the image with zeros first.
-        let (mut memory, mut row) = (memory(), vec![T::default(); width]);
-        let mut pixels = Vec::with_capacity(width * height);
-        for y in 0..height {
-            fill(&mut memory, y, &mut row);
-            pixels.extend_from_slice(&row);
-        }
-        return Gray { width, height, data: pixels };
-    }
-    let mut image = Gray::new(width, height);
-    fill_bands(image.pixels_mut(), width, |first, band| {
-        let mut memory = memory();
-        for (y, row) in (first..).zip(band.chunks_exact_mut(width)) {
-            fill(&mut memory, y, row);
-        }
-    });
-    image
 }
 
 #[cfg(test)]
@@ -88,11 +55,13 @@ mod tests {
         for (rows, width) in [(3..3, 10), (0..5, 0), (2..2000, 1000), (0..5, 2 * BAND_PX)] {
             assert_eq!(bands(rows.clone(), width, |band| band.collect()), rows.collect::<Vec<_>>());
         }
-        for (width, height) in [(1000, 5000), (1000, 3), (0, 3), (3, 0)] {
-            let image = image_of_rows(width, height, || (), |(), y, row| row.fill(y as u16));
-            assert_eq!([image.width(), image.height()], [width, height]);
-            assert_eq!(image.pixels().len(), width * height);
-            assert!((0..height).all(|y| image.row(y).iter().all(|&v| usize::from(v) == y)));
-        }
+        let width = 1000;
+        let mut pixels = vec![0; 3000 * width];
+        fill_bands(&mut pixels, width, |first, band| {
+            for (y, row) in band.chunks_mut(width).enumerate() {
+                row.fill(first + y);
+            }
+        });
+        assert!(pixels.chunks(width).enumerate().all(|(y, row)| row.iter().all(|&v| v == y)));
     }
 }

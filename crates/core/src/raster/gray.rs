@@ -3,9 +3,9 @@ use super::{Intensity, View};
 /// A grey image of `width × height` pixels, row-major.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gray<T> {
-    pub(super) width: usize,
-    pub(super) height: usize,
-    pub(super) data: Vec<T>,
+    width: usize,
+    height: usize,
+    data: Vec<T>,
 }
 
 impl<T: Intensity> Gray<T> {

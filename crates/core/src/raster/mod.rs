@@ -23,8 +23,7 @@ mod pyramid;
 mod view;
 
 pub use any_gray::{AnyGray, FileNotes};
-pub use bands::bands;
-use bands::{fill_bands, image_of_rows};
+pub use bands::{bands, fill_bands};
 pub use blur::gaussian;
 pub use camera_notes::CameraNotes;
 pub use colours::Colours;

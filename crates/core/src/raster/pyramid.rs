@@ -3,7 +3,7 @@ use std::borrow::Cow;
 use glam::DVec2;
 use multiversion::multiversion;
 
-use super::{Gray, ImageView, Intensity, PYRAMID_FULL_SCALE, View, image_of_rows, of_any};
+use super::{Gray, ImageView, Intensity, PYRAMID_FULL_SCALE, View, fill_bands, of_any};
 
 /// Smoothed copies of an image, each half the size of the previous one.
 ///
@@ -59,16 +59,24 @@ impl Pyramid<'_> {
 /// Filters with the 3×3 binomial (1 2 1)ᵀ(1 2 1)/16 with repeated borders; the result has 10 bits.
 fn binomial<T: Intensity>(image: View<T>) -> Gray<i16> {
     let (width, height) = (image.width(), image.height());
-    let memory = || (vec![0.0; width + 2], vec![0; width + 2]);
-    image_of_rows(width, height, memory, |(sums, sums_of_bytes), y, out| {
-        let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| image.row(y));
-        match rows.map(T::as_bytes) {
-            [Some(above), Some(here), Some(below)] => {
-                binomial_row_of_bytes([above, here, below], sums_of_bytes, out);
+    let mut out = Gray::new(width, height);
+    if width == 0 || height == 0 {
+        return out;
+    }
+    fill_bands(out.pixels_mut(), width, |first, band| {
+        let (mut sums, mut sums_of_bytes) = (vec![0.0; width + 2], vec![0; width + 2]);
+        for (i, out) in band.chunks_exact_mut(width).enumerate() {
+            let y = first + i;
+            let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| image.row(y));
+            match rows.map(T::as_bytes) {
+                [Some(above), Some(here), Some(below)] => {
+                    binomial_row_of_bytes([above, here, below], &mut sums_of_bytes, out);
+                }
+                _ => binomial_row(rows, &mut sums, out),
             }
-            _ => binomial_row(rows, sums, out),
         }
-    })
+    });
+    out
 }
 
 /// Filters a row of bytes with the binomial, by additions alone. For a sum S of at most 16 · 255,
@@ -125,12 +133,14 @@ fn binomial_row<T: Intensity>(rows: [&[T]; 3], columns: &mut [f32], out: &mut [i
 /// Computes the mean of each 2×2 block; drops an odd last row or column.
 fn half(image: &Gray<i16>) -> Gray<i16> {
     let (width, height) = (image.width() / 2, image.height() / 2);
-    image_of_rows(
-        width,
-        height,
-        || (),
-        |(), y, out| half_row([image.row(2 * y), image.row(2 * y + 1)], out),
-    )
+    let mut out = Gray::new(width, height);
+    fill_bands(out.pixels_mut(), width, |first, band| {
+        for (i, out) in band.chunks_exact_mut(width).enumerate() {
+            let y = 2 * (first + i);
+            half_row([image.row(y), image.row(y + 1)], out);
+        }
+    });
+    out
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
