@@ -63,7 +63,6 @@ fn describe(found: &Check) -> String {
         of.iter().map(ToString::to_string).collect::<Vec<_>>().join(between)
     };
     let of = format!("{}, {}", counted(found.views, "view"), counted(found.corners, "corner"));
-    // A change of one quantity may be hidden in the p-value of all quantities together.
     let p = found.p_value.map_or(String::new(), |p| format!(", {}", p_value(p)));
     let mut text = match found.answer {
         Answer::Unchanged => format!("unchanged: {of}{p}\n"),
@@ -76,6 +75,7 @@ fn describe(found: &Check) -> String {
                 to[0],
                 to[1]
             ),
+            // The p-value of all quantities together may be large beside a change of one.
             _ => {
                 let or: String =
                     found.or.iter().map(|quantity| format!(", or {quantity}")).collect();

@@ -69,8 +69,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         None => target_file::read_all_placed(&args.target, &limits).context("--target")?,
     };
     let mut targets: Vec<Target> = printed.iter().map(|one| one.target.clone()).collect();
-    let mut each: Vec<&mut Target> = targets.iter_mut().collect();
-    target_file::set_families(&mut each, args.family.as_deref())?;
+    target_file::set_families(&mut targets, args.family.as_deref())?;
     let sheet = args.sheet.read(&limits, &Reference::Scene(&targets).identities(), &printed)?;
     if let [_, _, ..] = targets.as_slice() {
         // Rejects sheet options that apply to a single sheet.

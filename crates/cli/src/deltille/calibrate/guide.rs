@@ -7,6 +7,7 @@ use std::time::{Duration, SystemTime};
 
 use anyhow::{Context, bail, ensure};
 
+use super::reasons::no_board;
 use super::sightings::{self, GridArgs, SheetArgs};
 use super::solving::{ModelChoice, projection_uncertainty};
 use crate::deltille::files::images::photographs_in;
@@ -367,8 +368,7 @@ impl Watch<'_> {
         let labelled = found.grids.iter().filter(|grid| grid.panel.is_some());
         let corners: usize = labelled.map(|grid| grid.corners.len()).sum();
         if corners == 0 {
-            let why = found.reasons.first().map_or(String::new(), |why| format!(": {why}"));
-            log!("{show}: no board found{why}");
+            log!("{show}: {}", no_board(found.reasons.first()));
             return Ok(Some(Seen::Nothing));
         }
         report!("{show}: {}", counted(corners, "corner"));

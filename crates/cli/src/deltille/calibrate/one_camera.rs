@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use anyhow::{Context, ensure};
 
 use super::compensation::{self, prepare};
+use super::reasons::no_board;
 use super::report_page::{check_images, note_missing};
 use super::sightings::{Empty, Sightings, SightingsArgs};
 use super::solving::{
@@ -123,8 +124,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         camera_file::check_or_note(known, &known_with, &targets, is_assumed)?;
     }
     for Empty { path, reason } in &empty {
-        let why = reason.as_ref().map_or(String::new(), |reason| format!(": {reason}"));
-        log!("{}: excluded: no board found{why}", path.display());
+        log!("{}: excluded: {}", path.display(), no_board(reason.as_ref()));
     }
     if empty.len() > views.len() {
         let all = counted(empty.len() + views.len(), "image");

@@ -4,6 +4,11 @@ use std::collections::BTreeMap;
 
 use deltille::detect::{Detection, Reason, ReasonKind};
 
+/// Reports that an image shows no board, with the reason if it is known.
+pub fn no_board(why: Option<&Reason>) -> String {
+    why.map_or_else(|| "no board found".to_owned(), |why| format!("no board found: {why}"))
+}
+
 /// Why images show no labels: the number of images, and the first reason, of each kind.
 #[derive(Default)]
 pub struct Reasons(BTreeMap<ReasonKind, (usize, Reason)>);

@@ -59,8 +59,12 @@ fn read_each(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<Printing>
 }
 
 /// Sets the family of each target; a given file applies to the targets that name its family.
-pub fn set_families(targets: &mut [&mut Target], given: Option<&str>) -> anyhow::Result<()> {
-    if let [only] = targets {
+pub fn set_families<'a>(
+    targets: impl IntoIterator<Item = &'a mut Target>,
+    given: Option<&str>,
+) -> anyhow::Result<()> {
+    let mut targets: Vec<&mut Target> = targets.into_iter().collect();
+    if let [only] = targets.as_mut_slice() {
         return set_family(only, given);
     }
     let name = given.map(|given| family::resolve(given).context("--family")).transpose()?;
@@ -81,8 +85,8 @@ pub fn set_families(targets: &mut [&mut Target], given: Option<&str>) -> anyhow:
 
 /// Sets the family of targets if it is given: detections from files need no codes.
 pub fn set_given_family(printed: &mut [Printing], given: Option<&str>) -> anyhow::Result<()> {
-    let mut targets: Vec<&mut Target> = printed.iter_mut().map(|one| &mut one.target).collect();
-    given.map_or(Ok(()), |given| set_families(&mut targets, Some(given)))
+    let targets = printed.iter_mut().map(|one| &mut one.target);
+    given.map_or(Ok(()), |given| set_families(targets, Some(given)))
 }
 
 /// Sets the family of a target, see [`target_file::set_family`].

@@ -100,8 +100,7 @@ impl FinderArgs {
         }
         let mut targets =
             target_file::read_all(&self.target, &self.limits()).context("--target")?;
-        let mut each: Vec<&mut Target> = targets.iter_mut().collect();
-        target_file::set_families(&mut each, self.family.as_deref())?;
+        target_file::set_families(&mut targets, self.family.as_deref())?;
         for target in &targets {
             let Some(family) = target.family()? else { continue };
             if let Some(limit) = self.max_errors.filter(|limit| *limit > family.correctable()) {
