@@ -49,9 +49,11 @@ impl OneTiling {
         let by_tags_px =
             TAG_SHIFT_BLURS * blur_px.filter(|_| !self.tag_areas.is_empty()).unwrap_or(0.0);
         let (mut refiner, mut least) = (Cow::Borrowed(&self.refiner), 0);
+        let mut before = None;
         if let Some(motion) = motion {
             refiner = Cow::Owned(self.refiner.with_motion_near(motion.astigmatism()));
         } else if let Some(shift) = shift.filter(|shift| shift.px > by_tags_px) {
+            before = Some((grids.to_vec(), blurs.clone()));
             refiner = Cow::Owned(self.refiner.with_ink_near(shift.edges));
             grids.iter_mut().for_each(|grid| centre(frame.image, grid, shift.edges));
             least = shift.level(levels.len());
@@ -79,6 +81,12 @@ impl OneTiling {
             }
         }
         let optics = refiner.optics(fitter, finest, grids, &blurs, &self.tag_areas);
+        if let Some((usual, before)) = before
+            && optics.ink() == 0.0
+        {
+            grids.clone_from_slice(&usual);
+            (refiner, blurs) = (Cow::Borrowed(&self.refiner), before);
+        }
         let found = self.refine_under(&refiner, fitter, frame.image, grids, optics, &blurs);
         let is_usual = matches!(refiner, Cow::Borrowed(_));
         Shared { noise: found.noise.filter(|_| is_usual), ..found }

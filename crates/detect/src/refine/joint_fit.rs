@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::correlation::{self, Influence};
-use super::model::corner::{Corner, OWN};
+use super::model::corner::{Corner, MIN_BLUR_PX, OWN};
 use super::model::fitter::CornerFitter;
 use super::model::joint::{Common, Joint};
 use super::model::window::Patch;
@@ -93,6 +93,15 @@ impl<const K: usize> Member<K> {
         let mut member = self.clone();
         member.corner.level += (factor - 1.0) * member.corner.amplitude.abs();
         member.corner.amplitude *= factor;
+        member
+    }
+
+    /// Returns the corner with the blur whose edges are seen at this distance, in standard deviations of the blur, from
+    /// their positions, where dark areas seem to have grown by `ink`, in edges.
+    pub(super) fn blurred(&self, ink: f64, distance: f64) -> Self {
+        let mut member = self.clone();
+        let across_px = member.corner.across_px.iter().sum::<f64>() / K as f64;
+        member.corner.blur_px = (ink.abs() * across_px / distance).max(MIN_BLUR_PX);
         member
     }
 }

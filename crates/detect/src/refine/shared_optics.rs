@@ -34,7 +34,15 @@ const WORTH_ESTIMATING: f64 = 0.5;
 /// Whites from which the fit starts if the image is clipped, relative to the brightest one that it shows. From a start
 /// at the limit of the sensor, the fit may end where dark areas have shrunk instead. Light that is clipped at less than
 /// 0.4 of white hides the middle of the edges.
-const CLIPPED_WHITES: [f64; 3] = [1.0, 1.5, 2.5];
+const CLIPPED_WHITES: [f64; 4] = [1.0, 1.5, 2.5, 5.0];
+
+/// The same if edges seem to have moved because light that is spread by blur is clipped, with the distance at which half
+/// of the visible light is reached on the dark side of an edge, in standard deviations of the blur: Φ⁻¹(1 − 1/(2·white)).
+const OVEREXPOSED_WHITES: [[f64; 2]; 4] = [[1.5, 0.431], [2.5, 0.842], [5.0, 1.282], [10.0, 1.645]];
+
+/// Maximum noise of the fit of an overexposed image, relative to that of a print whose dark areas have shrunk. The latter
+/// has one parameter more, which also explains differences between the tails of the blur and those of a Gaussian.
+const MAX_OVEREXPOSED_NOISE: f64 = 1.5;
 
 impl Optics {
     /// Estimates the optics from the corners of an image; a known tone curve is kept.
@@ -58,7 +66,7 @@ impl Optics {
         let plain_residual = median(residuals).unwrap_or(0.0);
         let known = Self { range, plain_residual, ..known.clone() };
         let is_clipped = range[1] >= 1.0;
-        let is_active = |p: usize| match p {
+        let is_active = |known: &Self, p: usize| match p {
             0..TONE_PARAMS => known.is_open,
             INK => known.is_ink_open,
             // Of a clipped edge, only the dark side shows its profile. Two edges do not move with their blur, and
@@ -68,20 +76,33 @@ impl Optics {
         };
         let members: Vec<Member<K>> = samples.into_iter().map(Member::from).collect();
         let greys = [blacks, whites].map(|greys| median(greys).unwrap_or(0.0));
-        let all: Vec<usize> = (0..PARAMS).filter(|&p| is_active(p)).collect();
-        let active = all.clone();
+        let (all, active) = (Vec::new(), Vec::new());
         let mut problem = Problem { fitter, image, members: Vec::new(), greys, all, active };
-        let mut fitted = |white: f64| {
+        let mut fitted = |known: &Self, members: Vec<Member<K>>, white: f64| {
+            problem.all = (0..PARAMS).filter(|&p| is_active(known, p)).collect();
+            problem.active.clone_from(&problem.all);
             problem.members = members.iter().map(|member| member.brighter(white)).collect();
             let range = [range[0], range[0] + white * (range[1] - range[0])];
             let (optics, at, found) = problem.chosen(Self { range, ..known.clone() }, is_clipped);
-            (noise_of(&at.equations), std::mem::take(&mut problem.members), optics, found)
+            (noise_of(&at.equations), (std::mem::take(&mut problem.members), optics, found))
         };
         let starts = if is_clipped { &CLIPPED_WHITES[..] } else { &[1.0] };
-        let fits = starts.iter().map(|&white| fitted(white));
-        let Some((_, members, optics, found)) = fits.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+        let fits = starts.iter().map(|&white| fitted(&known, members.clone(), white));
+        let Some((noise, mut best)) = fits.min_by(|a, b| a.0.total_cmp(&b.0)) else {
             return known;
         };
+        if is_clipped && known.is_ink_open && known.ink < 0.0 {
+            let unmoved = Self { ink: 0.0, is_ink_open: false, ..known.clone() };
+            let fits = OVEREXPOSED_WHITES.map(|[white, distance]| {
+                let blurred = members.iter().map(|member| member.blurred(known.ink(), distance));
+                fitted(&unmoved, blurred.collect(), white)
+            });
+            let unmoved = fits.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+            if let Some((_, fit)) = unmoved.filter(|fit| fit.0 <= MAX_OVEREXPOSED_NOISE * noise) {
+                best = fit;
+            }
+        }
+        let (members, optics, found) = best;
         problem.members = members;
         let inflation = problem.inflation(&optics);
         Self { tone: found.tone, ink_found: found.ink, inflation, ..optics }

@@ -30,7 +30,7 @@ const MAX_LN_BLUR: f64 = 1.0;
 /// Minimum blur, px: that of a pixel's box, as approximated by [`super::look::PixelBox`]. With less, blur and position of an
 /// edge along a row or column could not be distinguished, because only one row of pixels is grey. The maximum is half the
 /// radius.
-pub(super) const MIN_BLUR_PX: f64 = 0.273;
+pub(crate) const MIN_BLUR_PX: f64 = 0.273;
 
 /// Minimum angle between edges. Closer ones are a single edge, or a wrong minimum: 75° of tilt leave 17°.
 const MIN_ANGLE_RAD: f64 = 6.0 * std::f64::consts::PI / 180.0;
