@@ -40,9 +40,9 @@ const CLIPPED_WHITES: [f64; 4] = [1.0, 1.5, 2.5, 5.0];
 /// of the visible light is reached on the dark side of an edge, in standard deviations of the blur: Φ⁻¹(1 − 1/(2·white)).
 const OVEREXPOSED_WHITES: [[f64; 2]; 4] = [[1.5, 0.431], [2.5, 0.842], [5.0, 1.282], [10.0, 1.645]];
 
-/// Maximum noise of the fit of an overexposed image, relative to that of a print whose dark areas have shrunk. The latter
-/// has one parameter more, which also explains differences between the tails of the blur and those of a Gaussian.
-const MAX_OVEREXPOSED_NOISE: f64 = 1.5;
+/// Maximum noise of the fit of an overexposed image, relative to that of a print whose dark areas have shrunk: of two
+/// equal fits, that with fewer parameters. The median noise of the corners is known to within a few per cent.
+const MAX_OVEREXPOSED_NOISE: f64 = 1.05;
 
 impl Optics {
     /// Estimates the optics from the corners of an image; a known tone curve is kept.
