@@ -4,7 +4,7 @@
 
 A page drawn by cairo is seen through a Bayer mosaic with raw noise, whose planes OpenCV interpolates. The rows are: a
 monochrome sensor for comparison; interpolation along edges, with a linear and an sRGB curve, and by variable gradients;
-white at 1.9 and 2.5 times what the sensor can show; a telephone (denoised, sharpened, S-shaped contrast, JPEG 92); and the image
+white at 1.9, 2.5 and 3.7 times what the sensor can show; a telephone (denoised, sharpened, S-shaped contrast, JPEG 92); and the image
 reduced by half after interpolation.
 """
 
@@ -31,10 +31,13 @@ LIMITS = {
     "variable gradients": 0.007,
     "white at 1.9": 0.007,
     "white at 2.5": 0.007,
+    "white at 3.7": 0.03,
     "telephone": 0.013,
     "reduced by half": 0.005,
 }
 RATIOS = 0.5, 1.7
+# Light at the edges is clipped at a tenth of white, so single corners remain wrong by 0.1 px.
+OVEREXPOSED_RATIO = 6.0
 
 
 def interpolated(light, exposure, code, full, rng):
@@ -69,6 +72,7 @@ def pictures(light, rng):
     yield "variable gradients", eight_bits(interpolated(light.copy(), 1, cv2.COLOR_BayerBG2BGR_VNG, 255, rng))
     yield "white at 1.9", eight_bits(SRGB(along(3)))
     yield "white at 2.5", eight_bits(SRGB(along(4)))
+    yield "white at 3.7", eight_bits(SRGB(along(6)))
     yield "telephone", telephone(along(1))
     reduced = cv2.resize(along(1), None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
     yield "reduced by half", eight_bits(reduced)
@@ -112,11 +116,14 @@ def main(program, folder, views=1):
         ratio = np.mean([ratio for _, ratio in each])
         figures = ", ".join(f"{tilt}°: {rms:.4f} px ({ratio:.2f})" for tilt, (rms, ratio) in zip(TILTS, each))
         print(f"{row}: {figures}")
-        if not rms <= most or not RATIOS[0] < ratio < RATIOS[1]:
+        least, largest = RATIOS
+        if row == "white at 3.7":
+            largest = OVEREXPOSED_RATIO
+        if not rms <= most or not least < ratio < largest:
             faults.append(f"{row}: {rms:.4f} px, ratio {ratio:.2f}")
     assert not faults, faults
-    # At 65°, white at 2.5 separates the black tips of some corners.
-    allowed = {"white at 2.5": 0.2}
+    # At 45° and 65°, white at 2.5 and 3.7 separates the black tips of some corners.
+    allowed = {"white at 2.5": 0.2, "white at 3.7": 0.4}
     others = [row for row in LIMITS if row not in allowed]
     assert sum(lost[row] for row in others) <= 0.01 * sum(seen[row] for row in others), lost
     assert all(lost[row] <= part * seen[row] for row, part in allowed.items()), lost
