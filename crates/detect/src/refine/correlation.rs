@@ -32,6 +32,8 @@ pub(crate) struct Influence {
     pub residuals: Vec<f32>,
     /// Influence on x and y.
     pub on_position: [Vec<f32>; 2],
+    /// Derivatives of the model with respect to x and y.
+    pub slopes: [Vec<f32>; 2],
     /// Columns Q with H = Q Qᵀ.
     pub hat: Vec<Vec<f32>>,
     /// Standard deviation of the residuals.

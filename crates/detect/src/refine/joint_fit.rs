@@ -4,6 +4,7 @@
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::correlation::{self, Influence};
+use super::displaced_rows;
 use super::model::corner::{Corner, MIN_BLUR_PX, OWN};
 use super::model::fitter::CornerFitter;
 use super::model::joint::{Common, Joint};
@@ -358,12 +359,13 @@ impl<const K: usize> Problem<'_, K> {
         Some(if length > MAX_STEP { step * (MAX_STEP / length) } else { step })
     }
 
-    /// Returns the factor of the covariances for noise that is not white.
-    pub(super) fn inflation(&mut self, optics: &Optics) -> f64 {
+    /// Returns the factor of the covariances for noise that is not white, and limits of the variances of positions
+    /// from displaced pixels, px².
+    pub(super) fn inflation(&mut self, optics: &Optics) -> (f64, [f64; 2]) {
         let Self { fitter, image, members, .. } = self;
         if members.len() < correlation::CORNERS / 2 {
             // Too few to determine correlations.
-            return 1.0;
+            return (1.0, [0.0; 2]);
         }
         // Uses the corners with the lowest noise, because other objects next to a corner affect its
         // residuals.
@@ -372,7 +374,8 @@ impl<const K: usize> Problem<'_, K> {
             .filter_map(|member| fitter.influence(*image, &member.patch, &member.corner, optics))
             .collect();
         found.sort_by(|a, b| a.noise.total_cmp(&b.noise));
-        correlation::inflation(&found)
+        let inflation = correlation::inflation(&found);
+        (inflation, displaced_rows::limits(&found, inflation))
     }
 
     /// Returns the equations of all parameters at the members' corners.

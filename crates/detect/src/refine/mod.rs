@@ -9,13 +9,14 @@
 //!    (`blurred_corner`, with ink `displaced_edges`).
 //! 4. `edge_shift` measures how far edges have moved. `shared_optics` estimates the shared parameters (`optics`) from all
 //!    corners together. `joint_fit` fits them, and `significance` removes those that are not significant. `correlation`
-//!    corrects covariances for noise that is not white.
+//!    corrects covariances for noise that is not white, `displaced_rows` for errors that rows of pixels have in common.
 
 pub(crate) mod blurred_corner;
 pub(crate) mod clearance;
 pub(crate) mod corner_start;
 pub(crate) mod correlation;
 pub(crate) mod displaced_edges;
+pub(crate) mod displaced_rows;
 pub(crate) mod edge_shift;
 pub(crate) mod joint_fit;
 pub(crate) mod model;

@@ -65,6 +65,8 @@ pub(crate) struct Optics {
     pub ink: f64,
     /// Factor of the covariances of corners, for noise that is not white.
     pub inflation: f64,
+    /// Upper limits of the variances of x and y from displaced columns and rows of pixels, px².
+    pub displaced: [f64; 2],
     /// Covariance xx, xy, yy of the displacement of corners due to the uncertainty of the optics,
     /// px².
     pub shift: [f64; 3],
@@ -91,6 +93,7 @@ impl Default for Optics {
             halo: [0.0, HALO_WIDTH],
             ink: 0.0,
             inflation: 1.0,
+            displaced: [0.0; 2],
             shift: [0.0; 3],
             plain_residual: 0.0,
             tone: None,

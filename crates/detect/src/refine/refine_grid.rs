@@ -13,6 +13,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::clearance::{Prediction, Surroundings, TagAreas, surroundings, surroundings_of};
+use super::displaced_rows::widen;
 use super::joint_fit::Sample;
 use super::model::fitter::{CornerFitter, MAX_WAY_PX};
 use super::model::window::Patch;
@@ -284,6 +285,7 @@ impl Refiner {
             settled(of_fit).or_else(|| met_by_edges(image, of_fit.0, around))
         };
         grid.corners = corners.filter_map(held).collect();
+        widen(grid, sharpness.optics.displaced);
         let blurs = fits.iter().flatten().map(ModelFit::blur_px).collect();
         median(blurs).map(|blur_px| Seen { blur_px, noise: usual })
     }

@@ -104,8 +104,8 @@ impl Optics {
         }
         let (members, optics, found) = best;
         problem.members = members;
-        let inflation = problem.inflation(&optics);
-        Self { tone: found.tone, ink_found: found.ink, inflation, ..optics }
+        let (inflation, displaced) = problem.inflation(&optics);
+        Self { tone: found.tone, ink_found: found.ink, inflation, displaced, ..optics }
     }
 
     /// Returns the tone curve between black and white, given the covariance of the active parameters; `None` if it was

@@ -97,6 +97,12 @@ impl PlaneMap {
         Some(Self { origin, middle, size, params, place, cov, shape })
     }
 
+    /// Returns the position of a vertex, px.
+    pub(crate) fn place(&self, vertex: Vertex) -> DVec2 {
+        let way = self.shape.spacing.way(self.origin, vertex - self.origin);
+        self.place + position(&self.params, (way - self.middle) / self.size)
+    }
+
     /// Returns the map about a vertex; `None` if it is not in front of the camera.
     pub(crate) fn about(&self, vertex: Vertex) -> Option<LocalMap> {
         let way = self.shape.spacing.way(self.origin, vertex - self.origin);

@@ -147,6 +147,7 @@ impl CornerFitter {
             twice_middle: (2.0 * corner.position).round().as_ivec2().to_array(),
             residuals: self.columns[PARAMS][..window.count].to_vec(),
             on_position: [X, Y].map(|i| column(row(&inverse, i))),
+            slopes: [X, Y].map(|i| self.columns[i][..window.count].to_vec()),
             hat: (0..ANGLE + K).map(|i| column(row(&root, i))).collect(),
             noise,
         })
