@@ -37,8 +37,8 @@ const MIN_EVIDENCE: f64 = 4.0;
 const DIFFERENCE: [f64; 4] = [1.0, -3.0, 3.0, -1.0];
 const DIFFERENCE_SQUARE: f64 = 20.0;
 
-/// Minimum number of differences that determine a scatter to within a fifth.
-const MIN_DIFFERENCES: usize = 12;
+/// Minimum number of differences that determine a scatter: to within a third.
+const MIN_DIFFERENCES: usize = 6;
 
 /// Part of the squares that counts, and their mean in units of the variance: the largest ones may be of wrong corners.
 const COUNTED: f64 = 0.95;
@@ -109,21 +109,22 @@ pub(crate) fn widen(grid: &mut Grid, limits: [f64; 2]) {
     let corners: Vec<(Vertex, DVec2)> = grid.corners.iter().map(placed).collect();
     let places: BTreeMap<Vertex, DVec2> = corners.iter().copied().collect();
     let spacing = Spacing::of(grid.kind, places.keys().copied(), |v| places.get(&v).copied());
-    let plane = PlaneMap::of(&corners, Shape::usual(spacing));
+    let Some(plane) = PlaneMap::of(&corners, Shape::usual(spacing)) else { return };
     let off_plane = |corner: &GridCorner| {
         let (vertex, place) = placed(corner);
-        Some((vertex, (place - plane.as_ref()?.place(vertex), corner.cov?)))
+        Some((vertex, (place - plane.place(vertex), corner.cov?)))
     };
     let off_plane = grid.corners.iter().filter_map(off_plane).collect();
     // Lines of unequal spacing are equally spaced in pairs. If the spacing is nearly a period of the errors, these change
     // little from one line to the next.
     let strides = if spacing == Spacing::EQUAL { &[1, 2][..] } else { &[2] };
-    let steps = grid.kind.steps().iter().flat_map(|step| {
+    let steps = grid.kind.steps();
+    let steps = steps[..steps.len() / 2].iter().flat_map(|step| {
         strides.iter().map(move |stride| Vertex::new(stride * step.row, stride * step.col))
     });
     let scatter = |axis: usize| {
-        let along = steps.clone().filter_map(|step| excess_scatter(&off_plane, step, axis));
-        along.reduce(f64::max).unwrap_or(limits[axis]).min(limits[axis])
+        let along = steps.clone().map(|step| excess_scatter(&off_plane, step, axis));
+        along.flatten().fold(0.0, f64::max).min(limits[axis])
     };
     let added = [0, 1].map(scatter);
     for cov in grid.corners.iter_mut().filter_map(|corner| corner.cov.as_mut()) {
