@@ -14,8 +14,9 @@
 //!
 //! Pooled over the corners of an image, this determines τ². With the influence c of the pixels on y, its variance is
 //! τ² Σ (cᵀa)². This is an upper limit, because other errors of the model have the same effect on the residuals, although
-//! they move no corner. The scatter of corners about a smooth grid is another limit, because it contains the errors of
-//! the print. The smaller one is added to the covariances.
+//! they move no corner. If an image is sharp, δ may also come from pixels that are no full squares, for example if every
+//! second row is missing; this is limited by the effect of the shape of pixels. The scatter of corners about a smooth grid
+//! is another limit, because it contains the errors of the print. The smaller one is added to the covariances.
 
 use std::collections::BTreeMap;
 
@@ -23,6 +24,8 @@ use glam::DVec2;
 use nalgebra::{DMatrix, DVector};
 
 use super::correlation::Influence;
+use super::model::look::PixelBox;
+use super::optics::Optics;
 use crate::grid::map::local_map::Shape;
 use crate::grid::map::plane_map::PlaneMap;
 use crate::grid::map::spacing::Spacing;
@@ -100,8 +103,17 @@ pub(crate) fn limits(corners: &[Influence], inflation: f64) -> [f64; 2] {
     })
 }
 
-/// Adds the scatter of the corners about a smooth grid to the variances of x and y, up to these limits, px².
-pub(crate) fn widen(grid: &mut Grid, limits: [f64; 2]) {
+/// Adds the scatter of the corners about a smooth grid with this blur, px, to the variances of x and y, up to their limits.
+pub(crate) fn widen(grid: &mut Grid, optics: &Optics, blur_px: f64) {
+    let spread = optics.spread(grid.kind.steps().len() / 2);
+    let limits = [0, 1].map(|axis| {
+        let normal = [[1.0, 0.0], [0.0, 1.0]][axis];
+        let across_px = blur_px * spread.product(normal, normal).sqrt();
+        let limit = optics.displaced[axis].max(PixelBox::displacement_px(across_px).powi(2));
+        let variances = grid.corners.iter().filter_map(|corner| Some(corner.cov?[2 * axis]));
+        // Less would hardly change the standard deviations.
+        if median(variances.collect()).is_some_and(|usual| limit > usual) { limit } else { 0.0 }
+    });
     if limits == [0.0; 2] {
         return;
     }

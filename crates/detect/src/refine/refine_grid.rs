@@ -285,9 +285,10 @@ impl Refiner {
             settled(of_fit).or_else(|| met_by_edges(image, of_fit.0, around))
         };
         grid.corners = corners.filter_map(held).collect();
-        widen(grid, sharpness.optics.displaced);
         let blurs = fits.iter().flatten().map(ModelFit::blur_px).collect();
-        median(blurs).map(|blur_px| Seen { blur_px, noise: usual })
+        let blur_px = median(blurs)?;
+        widen(grid, sharpness.optics, blur_px);
+        Some(Seen { blur_px, noise: usual })
     }
 
     /// Returns whether the clear area around a corner suffices for the model.

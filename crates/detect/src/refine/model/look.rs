@@ -58,7 +58,7 @@ pub(super) struct Correlation {
 
 /// The strength of [`WithPixel`] across an edge.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct PixelBox {
+pub(crate) struct PixelBox {
     /// c.
     pub(super) strength: f64,
     /// −∂c/∂ln s_k, and ∂c/∂θ_k at constant s_k.
@@ -84,6 +84,12 @@ impl PixelBox {
         let strength = by_direction * (3.0 + cos) / 4.0;
         let by_sharpness = strength * (4.0 + 2.0 * extra / (1.0 + extra));
         Self { strength, by_sharpness, by_turn: -by_direction * sin }
+    }
+
+    /// Returns the RMS displacement, px, of a corner with edges along rows and columns by this term, under a blur of this
+    /// standard deviation, px. Without the term, errors were 1 to 3 times c s (tests).
+    pub(crate) fn displacement_px(blur_px: f64) -> f64 {
+        2.0 * Self::of(0.0, 1.0 / blur_px).strength * blur_px
     }
 }
 
