@@ -7,7 +7,6 @@ them. Draws a checkerboard from 8 × 8 points in each pixel, blurred by 0.7 px, 
 0.5 %, and processes it with OpenCV. Prints RMS errors per axis and squared errors over the stated variances.
 """
 
-import json
 import pathlib
 import subprocess
 import sys
@@ -15,10 +14,13 @@ import sys
 import cv2
 import numpy as np
 
+from colours import NOISE, SRGB, eight_bits, interpolated
+from sharp_edges import compared
+
 ROWS, COLS, SQUARE_PX, POINTS = 8, 11, 34.3, 8
 TURNS_DEG = [0.2, 4, 20]
 SEEDS = 3
-# Squared errors over the variances, means over the images. At 0.2° they are 3 to 100 for rows without errors of their own.
+# Squared errors over the variances, means over the images. At 0.2° they are 2 to 100 for rows without errors of their own.
 RATIOS = 0.1, 5.0
 
 
@@ -42,38 +44,25 @@ def light(turn, shift):
     return fine.reshape(height, POINTS, width, POINTS).mean((1, 3)), truth
 
 
-def bytes_of(image):
-    return np.clip(np.rint(image * 255), 0, 255).astype(np.uint8)
-
-
 def scaled(image, truth, scale, method):
     """A resized image; OpenCV rounds its sides, but not the scale."""
     resized = cv2.resize(image.astype(np.float32), None, fx=scale, fy=scale, interpolation=method)
-    return bytes_of(resized), (truth + 0.5) * scale - 0.5
-
-
-def interpolated(image, rng, curve=lambda light: light):
-    """From a Bayer mosaic, in colour."""
-    raw = image.copy()
-    raw[0::2, 0::2] *= 0.8
-    raw[1::2, 1::2] *= 0.7
-    raw = np.rint(np.clip(raw + rng.normal(0, 0.005, raw.shape), 0, 1) * 65535).astype(np.uint16)
-    colours = cv2.demosaicing(raw, cv2.COLOR_BayerBG2BGR_EA) / 65535 / [0.8, 1, 0.7]
-    return bytes_of(curve(np.clip(colours, 0, 1)))
+    return eight_bits(resized), (truth + 0.5) * scale - 0.5
 
 
 def compressed(image, quality):
-    return cv2.imdecode(cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1], 1)
+    return cv2.imdecode(cv2.imencode(".jpg", eight_bits(image), [cv2.IMWRITE_JPEG_QUALITY, quality])[1], 1)
 
 
 def pictures(image, truth, rng):
-    noisy = image + rng.normal(0, 0.005, image.shape)
-    yield "plain", bytes_of(noisy), truth
+    noisy = image + rng.normal(0, NOISE, image.shape)
+    colours = lambda: interpolated(image.copy(), 1, cv2.COLOR_BayerBG2BGR_EA, 65535, rng)
+    yield "plain", eight_bits(noisy), truth
     yield "reduced to 0.75, linear", *scaled(noisy, truth, 0.75, cv2.INTER_LINEAR)
     yield "reduced to 0.6, area", *scaled(noisy, truth, 0.6, cv2.INTER_AREA)
     yield "enlarged to 1.3, cubic", *scaled(noisy, truth, 1.3, cv2.INTER_CUBIC)
-    yield "mosaic, JPEG 95", compressed(interpolated(image, rng), 95), truth
-    yield "mosaic, sRGB, JPEG 85", compressed(interpolated(image, rng, lambda light: light ** (1 / 2.2)), 85), truth
+    yield "mosaic, JPEG 95", compressed(colours(), 95), truth
+    yield "mosaic, sRGB, JPEG 85", compressed(SRGB(colours()), 85), truth
 
 
 def main(deltille, folder):
@@ -92,14 +81,10 @@ def main(deltille, folder):
     subprocess.run([str(of) for of in command], check=True, capture_output=True)
     errors, ratios = {}, {}
     for stem, (key, truth) in truths.items():
-        corners = [corner for grid in json.loads((found / f"{stem}.json").read_text())["grids"] for corner in grid["corners"]]
+        corners = list(compared(found / f"{stem}.json", truth))
         assert len(corners) == ROWS * COLS, f"{stem}: {len(corners)} corners"
-        for corner in corners:
-            off = truth - [corner["x"], corner["y"]]
-            off = off[np.hypot(*off.T).argmin()]
-            xx, xy, yy = corner["cov"]
-            errors.setdefault(key, []).append(off)
-            ratios.setdefault(key, []).append(off @ np.linalg.solve([[xx, xy], [xy, yy]], off) / 2)
+        errors.setdefault(key, []).extend(off for off, _ in corners)
+        ratios.setdefault(key, []).extend(ratio for _, ratio in corners)
     print("| image | " + " | ".join(f"{turn}°: RMS px, e²/σ²" for turn in TURNS_DEG) + " |\n" + "|---" * (1 + len(TURNS_DEG)) + "|")
     failed = []
     for name in dict.fromkeys(name for name, _ in errors):

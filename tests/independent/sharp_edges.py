@@ -43,6 +43,15 @@ def board(turn, blur, shift):
     return image, middle + flat[:, :1] * along + flat[:, 1:] * [-along[1], along[0]]
 
 
+def compared(found, truth):
+    """The error of each corner of a detection from the nearest true one, and its square over the variance."""
+    for corner in (corner for grid in json.loads(found.read_text())["grids"] for corner in grid["corners"]):
+        off = truth - [corner["x"], corner["y"]]
+        off = off[np.hypot(*off.T).argmin()]
+        xx, xy, yy = corner["cov"]
+        yield off, off @ np.linalg.solve([[xx, xy], [xy, yy]], off) / 2
+
+
 def main(deltille, folder):
     folder.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(5)
@@ -59,14 +68,10 @@ def main(deltille, folder):
                 options = ["--grid", "checker", "--rows", ROWS, "--cols", COLS, "--format", "json", "-o", folder, "--force"]
                 command = [str(of) for of in (deltille, "detect", path, *options)]
                 subprocess.run(command, check=True, capture_output=True)
-                corners = [of for grid in json.loads((folder / "board.json").read_text())["grids"] for of in grid["corners"]]
+                corners = list(compared(folder / "board.json", truth))
                 assert len(corners) == ROWS * COLS, f"{blur} {turn} {shift}: {len(corners)} corners"
-                for corner in corners:
-                    off = truth - [corner["x"], corner["y"]]
-                    off = off[np.hypot(*off.T).argmin()]
-                    xx, xy, yy = corner["cov"]
-                    errors.append(off)
-                    shares.append(off @ np.linalg.solve([[xx, xy], [xy, yy]], off) / 2)
+                errors += [off for off, _ in corners]
+                shares += [share for _, share in corners]
             rms, share = np.sqrt(np.mean(np.square(errors))), np.mean(shares)
             cells.append(f"{rms:.4f}, {share:.2f}")
             if rms > (most if turn == TURNS_DEG[-1] else most_aligned) or share > 3:

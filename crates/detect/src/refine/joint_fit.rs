@@ -4,7 +4,6 @@
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::correlation::{self, Influence};
-use super::displaced_rows;
 use super::model::corner::{Corner, MIN_BLUR_PX, OWN};
 use super::model::fitter::CornerFitter;
 use super::model::joint::{Common, Joint};
@@ -359,23 +358,19 @@ impl<const K: usize> Problem<'_, K> {
         Some(if length > MAX_STEP { step * (MAX_STEP / length) } else { step })
     }
 
-    /// Returns the factor of the covariances for noise that is not white, and limits of the variances of positions
-    /// from displaced pixels, px².
-    pub(super) fn inflation(&mut self, optics: &Optics) -> (f64, [f64; 2]) {
+    /// Returns the influence of pixels on the corners, the lowest noise first, because other objects next to a corner
+    /// affect its residuals; none if there are too few corners to determine correlations.
+    pub(super) fn influences(&mut self, optics: &Optics) -> Vec<Influence> {
         let Self { fitter, image, members, .. } = self;
         if members.len() < correlation::CORNERS / 2 {
-            // Too few to determine correlations.
-            return (1.0, [0.0; 2]);
+            return Vec::new();
         }
-        // Uses the corners with the lowest noise, because other objects next to a corner affect its
-        // residuals.
         let mut found: Vec<Influence> = members
             .iter()
             .filter_map(|member| fitter.influence(*image, &member.patch, &member.corner, optics))
             .collect();
         found.sort_by(|a, b| a.noise.total_cmp(&b.noise));
-        let inflation = correlation::inflation(&found);
-        (inflation, displaced_rows::limits(&found, inflation))
+        found
     }
 
     /// Returns the equations of all parameters at the members' corners.

@@ -9,6 +9,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::correlation;
+use super::displaced_rows;
 use super::joint_fit::{Linearised, Member, Problem, Sample, noise_of, weights_of};
 use super::model::fitter::CornerFitter;
 use super::optics::{CROSS, HALO, INK, Optics, PARAMS};
@@ -104,7 +106,9 @@ impl Optics {
         }
         let (members, optics, found) = best;
         problem.members = members;
-        let (inflation, displaced) = problem.inflation(&optics);
+        let influences = problem.influences(&optics);
+        let inflation = correlation::inflation(&influences);
+        let displaced = displaced_rows::limits(&influences, inflation);
         Self { tone: found.tone, ink_found: found.ink, inflation, displaced, ..optics }
     }
 
