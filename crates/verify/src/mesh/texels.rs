@@ -30,6 +30,9 @@ const OPEN: f64 = 1e-6;
 /// edges, so that a cell is not all edge.
 const MOVED_CELLS: f64 = 0.1;
 
+/// [`MAX_INK_ERROR`] as a difference of grey values.
+const MAX_SHADE_ERROR: u8 = (MAX_INK_ERROR * 255.0) as u8;
+
 /// A face and its texture.
 pub(super) struct Texels<'a> {
     pub model: &'a Model,
@@ -64,14 +67,11 @@ impl Texels<'_> {
             let texel_mm = self.model.texel_mm(triangle);
             let found: Vec<DVec2> = (rows.into_par_iter())
                 .flat_map_iter(|(row, columns)| {
-                    columns.map(move |column| DVec2::new(column as f64, row as f64))
+                    let other = self.other_colours(texture.row(row), columns, |column| {
+                        panel_from_texel.transform_point2(DVec2::new(column as f64, row as f64))
+                    });
+                    other.into_iter().filter(|&place| !self.is_edge(place, texel_mm, with_tiles))
                 })
-                .filter(|&texel| {
-                    let light = texture.at(texel.x as usize, texel.y as usize);
-                    let place = panel_from_texel.transform_point2(texel);
-                    self.is_wrong(light, place, texel_mm, with_tiles)
-                })
-                .map(|texel| panel_from_texel.transform_point2(texel))
                 .collect();
             for place in found {
                 let last = DVec2::new(width as f64 - 1.0, height as f64 - 1.0);
@@ -82,29 +82,51 @@ impl Texels<'_> {
         Ok(wrong)
     }
 
-    /// Whether a texel at a position on the panel, mm, has the wrong colour and is not part of an edge.
-    fn is_wrong(&self, light: u8, place: DVec2, texel_mm: f64, with_tiles: bool) -> bool {
-        let ink = 1.0 - f64::from(light) / 255.0;
+    /// Returns the positions on the panel, mm, of the texels of a row that have another colour than the panel there.
+    fn other_colours(
+        &self,
+        row: &[u8],
+        columns: Range<usize>,
+        place: impl Fn(usize) -> DVec2,
+    ) -> Vec<DVec2> {
+        let is_inside = |column| self.inside_mm(place(column)) >= 0.0;
+        let way = (place(1) - place(0)) / self.panel.edge_mm;
+        let mut other = Vec::new();
+        let mut first = columns.start;
+        while first < columns.end {
+            let at = place(first) / self.panel.edge_mm;
+            let black = self.pattern.is_black_at(at) && is_inside(first);
+            let same = self.pattern.same_along(at, way) as usize;
+            let mut end = columns.end.min(same.saturating_add(first + 1));
+            if self.panel.inverted && !(is_inside(first) && is_inside(end - 1)) {
+                end = first + 1;
+            }
+            let shade = if black { 0 } else { u8::MAX };
+            let is_other = |&column: &usize| row[column].abs_diff(shade) > MAX_SHADE_ERROR;
+            other.extend((first..end).filter(is_other).map(&place));
+            first = end;
+        }
+        other
+    }
+
+    /// Whether a position on the panel, mm, is part of an edge, or of a tile unless `with_tiles` is set.
+    fn is_edge(&self, place: DVec2, texel_mm: f64, with_tiles: bool) -> bool {
         let at = place / self.panel.edge_mm;
-        let inside = if self.panel.inverted { self.inside_mm(place) } else { f64::INFINITY };
-        let colour = self.pattern.is_black_at(at);
-        let black = colour && inside >= 0.0;
-        if (ink - f64::from(u8::from(black))).abs() <= MAX_INK_ERROR {
-            return false;
-        }
         if !with_tiles && self.pattern.has_tile_at(at) {
-            return false;
+            return true;
         }
+        let inside = self.inside_mm(place);
+        let colour = self.pattern.is_black_at(at);
         // Around drawn edges: within the tolerance of positions, plus the smear of rendering.
         let smear_mm = EDGE_PX * texel_mm;
         let near_mm = smear_mm + MESH_TOLERANCE_MM.min(MOVED_CELLS * self.cell_mm);
         let field_mm = if self.fills_face { smear_mm } else { near_mm };
         if inside.abs() <= field_mm {
-            return false;
+            return true;
         }
         let mut probes = (0..PROBES).map(|n| f64::from(n) * TAU / f64::from(PROBES));
         // A circle alone would miss cells narrower than it.
-        !probes.any(|angle| {
+        probes.any(|angle| {
             [smear_mm, near_mm].iter().any(|radius_mm| {
                 let probe = radius_mm / self.panel.edge_mm * DVec2::from_angle(angle);
                 self.pattern.is_black_at(at + probe) != colour
@@ -112,8 +134,11 @@ impl Texels<'_> {
         })
     }
 
-    /// Returns how far a position lies within the field of an inverted panel, mm.
+    /// Returns how far a position lies within the field of an inverted panel, mm; other panels have no field.
     fn inside_mm(&self, place: DVec2) -> f64 {
+        if !self.panel.inverted {
+            return f64::INFINITY;
+        }
         let next = self.field.iter().cycle().skip(1);
         let depths = self
             .field

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use glam::DVec2;
+use glam::{DMat2, DVec2};
 
 use crate::panel::tile_table::TileTable;
 use deltille_core::family::Family;
@@ -82,9 +82,41 @@ impl<'a> Pattern<'a> {
         if expected.tag.is_none() {
             return expected.black;
         }
+        let (origin, tile_from_panel) = self.tile_coordinates(tile);
+        expected.is_black_at(tile_from_panel * (at - origin))
+    }
+
+    /// Returns how far the colour at a point, in edges, certainly stays the same along `way`, as a multiple of it.
+    pub(crate) fn same_along(&self, at: DVec2, way: DVec2) -> f64 {
+        let tile = self.panel.tile_at(at);
+        let (origin, tile_from_panel) = self.tile_coordinates(tile);
+        let (mut p, mut way) = (tile_from_panel * (at - origin), tile_from_panel * way);
+        if let Some(tag) = self.table.get(tile).and_then(|expected| expected.tag.as_ref()) {
+            if tag.looks.hole.is_some() || tag.looks.bit(p).is_none() {
+                return 0.0;
+            }
+            p = (p * tag.looks.width - tag.looks.inset).fract();
+            way *= tag.looks.width;
+            if self.panel.kind == GridKind::Deltille && p.element_sum() >= 1.0 {
+                (p, way) = (1.0 - p, -way);
+            }
+        }
+        // Beyond the sides along the axes, and the opposite ones.
+        let (rest, shrinks_by) = match self.panel.kind {
+            GridKind::Checker => (1.0 - p, -way),
+            GridKind::Deltille => {
+                (DVec2::splat(1.0 - p.element_sum()), DVec2::splat(-way.element_sum()))
+            }
+        };
+        let sides = [(p.x, way.x), (p.y, way.y), (rest.x, shrinks_by.x), (rest.y, shrinks_by.y)];
+        let ends = sides.map(|(from, by)| if by < 0.0 { from / -by } else { f64::INFINITY });
+        ends.into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    /// Returns the origin of the coordinates of a tile, in edges, and the map to them.
+    fn tile_coordinates(&self, tile: Tile) -> (DVec2, DMat2) {
         let [a, b, c] = tile.frame().map(|vertex| self.panel.position(vertex));
-        let (ab, ac, p) = (b - a, c - a, at - a);
-        expected.is_black_at(DVec2::new(p.perp_dot(ac), ab.perp_dot(p)) / ab.perp_dot(ac))
+        (a, DMat2::from_cols(b - a, c - a).inverse())
     }
 }
 
@@ -170,5 +202,40 @@ impl TagLooks {
         }
         let place = row * self.columns + col;
         self.bits.get(2 * place + usize::from(upright)).copied().flatten()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deltille_core::targets::{BoardSpec, Target};
+
+    #[test]
+    fn the_colour_stays_the_same_as_far_as_stated() {
+        for (kind, family) in
+            [(GridKind::Deltille, "delTag25h7"), (GridKind::Checker, "aprilTag36h11")]
+        {
+            let family = Family::shipped(family).unwrap();
+            let target = Target::new("board", BoardSpec::new(kind, 4, 5, 20.0)).unwrap();
+            let panel = &target.panels[0];
+            let looks = TagLooks::new(&family, panel);
+            let expected = expected(panel, Some(&family), Some(&looks));
+            let pattern = Pattern::new(panel, &expected);
+            let mut stated = 0;
+            for n in 0..4000 {
+                let n = f64::from(n);
+                // Irrational steps spread the positions evenly.
+                let at =
+                    DVec2::new((n * 0.618_034).fract() * 7.0, (n * 0.754_878).fract() * 5.0) - 1.0;
+                let way = 0.01 * DVec2::from_angle(n);
+                let same = pattern.same_along(at, way).min(100.0);
+                let colours = (0..20)
+                    .map(|i| pattern.is_black_at(at + 0.999 * f64::from(i) / 19.0 * same * way));
+                let black = pattern.is_black_at(at);
+                assert!(colours.into_iter().all(|colour| colour == black), "{at}, {way}");
+                stated += u32::from(same >= 1.0);
+            }
+            assert!(stated > 3000, "{stated}");
+        }
     }
 }
