@@ -5,7 +5,7 @@ import { type Shot, made, seen, stem } from "./shared";
 import { posesPicture } from "./pictures";
 import { surveyed, tints } from "./survey";
 import { words } from "./words";
-import type { HoldStatus, Next, Result, Sought, Survey } from "./worker";
+import type { HoldStatus, Next, Result, Sought, Survey, TextFile } from "./worker";
 
 /** Range of the print scale: beyond it, the check bars were misread. */
 const SCALES = [0.5, 2] as const;
@@ -162,7 +162,7 @@ export function calibrate(): HTMLElement {
     }
   }
 
-  function show({ figures, said, files }: Result): void {
+  function show({ figures, said, files, others }: Result): void {
     const text = words.calibrate;
     const digits = (value: number, sd: number | null) => (sd && sd > 0 ? value.toFixed(Math.max(0, 2 - Math.floor(Math.log10(sd)))) : value.toPrecision(7));
     const rows = figures.names.flatMap((name, i) => {
@@ -172,13 +172,14 @@ export function calibrate(): HTMLElement {
       return el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, digits(value, sd)), el("td", {}, sd ? sd.toPrecision(2) : ""));
     });
     const sure = figures.projection_sd_px;
+    const download = ({ name, text }: TextFile) => el("button", { type: "button", click: () => save(name, text) }, name === "camera-report.html" ? words.calibrate.page : name);
     result.replaceChildren(
       el("p", { class: said.length > 0 ? "facts" : "good" }, text.rms(figures.rms_px.toFixed(4), figures.views)),
       sure ? el("p", {}, text.sure(sure.toFixed(4), figures.is_observed)) : "",
       seen.assumedEdge === null ? "" : el("p", { class: "warning" }, text.assumedEdge(seen.assumedEdge)),
       said.length > 0 ? el("ul", {}, ...said.map((sentence) => el("li", {}, sentence))) : el("p", {}, text.nothing),
       el("table", {}, el("thead", {}, el("tr", {}, ...[text.parameter, text.value, text.deviation].map((head) => el("th", { scope: "col" }, head)))), el("tbody", {}, ...rows)),
-      el("div", { class: "buttons" }, ...files.map(({ name, text }) => el("button", { type: "button", click: () => save(name, text) }, name === "camera-report.html" ? words.calibrate.page : name))),
+      el("div", { class: "buttons" }, ...files.map(download), el("details", { hidden: others.length === 0 }, el("summary", {}, text.more), el("div", { class: "buttons" }, ...others.map(download)))),
     );
   }
 

@@ -244,6 +244,7 @@ export const words = {
       "double-sphere": "double-sphere: for programs that require it",
     } as Record<string, string>,
     start: "Calibrate",
+    more: "Formats of other programs",
     few: (count: number) => `${imageCount(count)} with labelled corners. A good calibration needs ten or more, tilted by 20° to 45°.`,
     detecting: "Waiting for the detection in the photographs…",
     solving: "Calibrating…",

@@ -82,7 +82,9 @@ export type Figures = {
   /** Whether it comes from the scatter between views, not only from the noise of the corners. */
   is_observed: boolean;
 };
-export type Result = { figures: Figures; said: string[]; files: { name: string; text: string }[] };
+/** `others` are the camera in formats of other programs. */
+export type Result = { figures: Figures; said: string[]; files: TextFile[]; others: TextFile[] };
+export type TextFile = { name: string; text: string };
 
 /** Ink spread of a print, estimated from several images: for the library, and in words. */
 export type Ink = { estimate: string; words: string };
@@ -320,16 +322,10 @@ const calls = {
   async calibrate(target: string, detections: string[], names: string[], model: string, printScale: [number, number] | null): Promise<Result> {
     const { Solved } = await solver();
     return using(new Solved(target, detections, names, model, printScale && Float64Array.from(printScale)), (solved) => {
-      const files = [
-        { name: "camera.json", text: solved.json() },
-        { name: "camera.yaml", text: solved.yaml() },
-        { name: "camera-report.html", text: solved.page() },
-      ];
-      const opencv = solved.opencv();
-      if (opencv !== undefined) files.push({ name: "camera-opencv.yaml", text: opencv });
-      const ros = solved.ros();
-      if (ros !== undefined) files.push({ name: "camera-ros.yaml", text: ros });
-      return { figures: JSON.parse(solved.figures()) as Figures, said: solved.said(), files };
+      const formats = solved.formats();
+      const [camera, ...others] = formats.flatMap((end, i) => (i % 2 === 0 ? [{ name: `camera${end}`, text: formats[i + 1] ?? "" }] : []));
+      const files = [{ name: "camera.json", text: solved.json() }, ...(camera ? [camera] : []), { name: "camera-report.html", text: solved.page() }];
+      return { figures: JSON.parse(solved.figures()) as Figures, said: solved.said(), files, others };
     });
   },
   async family(name: string): Promise<{ figures: FamilyFigures; cells: string; codes: bigint[] }> {

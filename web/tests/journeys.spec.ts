@@ -534,10 +534,12 @@ test.describe("calibrate", () => {
     // The program computes the same calibration from the same photographs.
     const [detections, out, target] = [scratch(), scratch(), ["--target", join(folder, "board.json")]];
     deltille("detect", ...shots, ...target, "-o", detections);
-    deltille("calibrate", detections, ...target, "--model", "radtan", "--format", "own,opencv,ros", "--report", join(out, "camera-report.html"), "-o", out);
+    deltille("calibrate", detections, ...target, "--model", "radtan", "--format", "own,opencv,ros,kalibr,colmap,nerfstudio,mrcal", "--report", join(out, "camera-report.html"), "-o", out);
     const read = (file: string) => readFileSync(join(out, file), "utf8");
     // Last digits differ: the order of summation depends on the processor's vector width, which WebAssembly does not share.
-    for (const file of ["camera.yaml", "camera.json", "camera-opencv.yaml", "camera-ros.yaml"]) {
+    await page.getByText("Formats of other programs").click();
+    const ends = ["-opencv.yaml", "-ros.yaml", "-camchain.yaml", "-cameras.txt", "-transforms.json", ".cameramodel"];
+    for (const file of ["camera.yaml", "camera.json", ...ends.map((end) => `camera${end}`)]) {
       const [text, others] = [(await press(page, file)).toString(), read(file)].map(split);
       expect(text?.words, file).toEqual(others?.words);
       const worst = apart(text?.numbers, others?.numbers);

@@ -12,7 +12,7 @@ use deltille_core::quantity::print_scale;
 use deltille_core::targets::Target;
 use deltille_files::export::calibration::{Print, Residuals};
 use deltille_files::export::sheet::Sheet;
-use deltille_files::export::{calibration, camera, detection, next_view, saved};
+use deltille_files::export::{CAMERA_FORMATS, Written, calibration, detection, next_view, saved};
 use deltille_files::report::{Report, Survey, camera_notes};
 use deltille_layout::Printing;
 use wasm_bindgen::prelude::*;
@@ -23,9 +23,7 @@ use deltille_web::errors::{Raise, one_line};
 #[wasm_bindgen]
 pub struct Solved {
     json: String,
-    yaml: String,
-    opencv: Option<String>,
-    ros: Option<String>,
+    formats: Vec<String>,
     page: String,
     said: Vec<String>,
     figures: String,
@@ -93,11 +91,17 @@ impl Solved {
             calibrated_with: estimate.calibrated_with.clone(),
             failed: saved::failures(&json).into_iter().next(),
         };
+        let views: Vec<(&str, Pose)> =
+            found.views.iter().map(|view| (view.image.as_str(), view.pose)).collect();
+        let written = Written { file: &file, name: "camera", views: &views };
+        // Files of other formats cannot state the reason for a failure.
+        let formats =
+            CAMERA_FORMATS.iter().filter(|format| format.is_own() || file.failed.is_none());
+        let formats =
+            formats.filter_map(|format| Some([format.end.to_owned(), format.text(&written).ok()?]));
         Ok(Self {
-            yaml: file.to_yaml(),
             json,
-            opencv: camera::opencv(&found.camera).ok(),
-            ros: camera::ros(&found.camera, "camera").ok(),
+            formats: formats.flatten().collect(),
             said: page.remedies().iter().map(one_line).collect(),
             page: page.html(),
             figures: figures.to_string(),
@@ -109,19 +113,10 @@ impl Solved {
         self.json.clone()
     }
 
-    /// Returns the camera file of the programs.
-    pub fn yaml(&self) -> String {
-        self.yaml.clone()
-    }
-
-    /// Returns the camera file for OpenCV, if OpenCV supports the model.
-    pub fn opencv(&self) -> Option<String> {
-        self.opencv.clone()
-    }
-
-    /// Returns the camera file for ROS, if ROS supports the model.
-    pub fn ros(&self) -> Option<String> {
-        self.ros.clone()
+    /// Returns the camera file in each format that supports the model, that of the programs first: the end of its name, then
+    /// its text.
+    pub fn formats(&self) -> Vec<String> {
+        self.formats.clone()
     }
 
     /// Returns the report as HTML.
