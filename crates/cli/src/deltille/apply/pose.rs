@@ -63,92 +63,25 @@ pub struct Args {
 
 /// Detects the target in each image and writes its pose as a line of JSON or CSV.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let limits = args.limits.limits();
-    let printed = match args.grid.read_target()? {
-        Some((_, target)) => vec![target.into()],
-        None => target_file::read_all_placed(&args.target, &limits).context("--target")?,
-    };
-    let mut targets: Vec<Target> = printed.iter().map(|one| one.target.clone()).collect();
-    target_file::set_families(&mut targets, args.family.as_deref())?;
-    let sheet = args.sheet.read(&limits, &Reference::Scene(&targets).identities(), &printed)?;
-    if let [_, _, ..] = targets.as_slice() {
-        // Rejects sheet options that apply to a single sheet.
-        sightings::panels(&Reference::Scene(&targets), &sheet)?;
-    }
-    let each: Vec<&Target> = targets.iter().collect();
-    let detector = Detector::for_targets(&each, DetectorConfig::default()).context("--target")?;
-    let camera = camera_file::read_for("--camera", &args.camera, &targets, args.assume_target)?;
-    for target in &targets {
-        if let Some(ambiguity) = Reference::Target(target).label_ambiguity() {
-            log!("note: {}: {ambiguity}", target.name);
-        }
-    }
-    let finder = Finder { detector, camera, targets, sheet, limits };
-    let (path, format) = match &args.output {
-        Some(path) => {
-            let path = output::file_of(path, "poses", &["ndjson", "csv"])?;
-            let ending = path.extension().unwrap_or_default().to_string_lossy();
-            let format = PoseFormat::of_extension(&ending).context("-o: no format of poses")?;
-            let kind = match format {
-                PoseFormat::Csv => Kind::of(format.head().as_bytes()),
-                PoseFormat::JsonLines => Kind::of_schema(pose::SCHEMA),
-            };
-            args.overwrite.check(&path, &kind)?;
-            (Some(path), format)
-        }
-        None => (None, PoseFormat::JsonLines),
-    };
-    let (mut lines, mut all, mut without, mut unread) = (format.head(), 0, 0, 0);
+    let finder = args.finder()?;
+    let (path, format) = args.file()?;
+    let (mut lines, mut all, mut found, mut unread) = (format.head(), 0, 0, 0);
     let images = Images::of(&args.images)?;
-    let options = args.recording.options(limits, &images)?;
+    let options = args.recording.options(finder.limits, &images)?;
     interrupt::keeps_results();
     for frame in images.frames(&options, true) {
         if interrupt::is_raised() {
             break;
         }
-        let frame = frame?;
+        let (seen, of_image) = finder.lines(frame?, format, args.all_images)?;
         all += 1;
-        let (name, image) = (frame.name(), frame.path().to_owned());
-        let time_ns = frame.time_ns();
-        let mut of_image = String::new();
-        match finder.find(frame, &name)? {
-            Seen::Unread(why) => {
-                log!("error: {why}");
-                (without, unread) = (without + 1, unread + 1);
-                for target in finder.targets.iter().filter(|_| args.all_images) {
-                    of_image += &(format.line_without(&name, time_ns, &target.name, &why) + "\n");
-                }
-            }
-            Seen::Targets(found) => {
-                let is_there = found.iter().any(Result::is_ok);
-                without += usize::from(!is_there);
-                for (target, found) in finder.targets.iter().zip(found) {
-                    match found {
-                        Ok(found) => {
-                            let views = found.cameras.iter().flat_map(|camera| &camera.views);
-                            let line = |view| format.line(&found, view, time_ns, target) + "\n";
-                            of_image += &views.map(line).collect::<String>();
-                        }
-                        Err(why) => {
-                            // With several targets, an image need not show all of them.
-                            if !is_there {
-                                log!("{}: {}{why}", image.display(), finder.of_target(target));
-                            }
-                            if args.all_images {
-                                let line = format.line_without(&name, time_ns, &target.name, &why);
-                                of_image += &(line + "\n");
-                            }
-                        }
-                    }
-                }
-            }
-        }
+        found += usize::from(seen.is_there());
+        unread += usize::from(matches!(seen, Seen::Unread(_)));
         match path {
             Some(_) => lines += &of_image,
             None => output::print(&of_image)?,
         }
     }
-    let found = all - without;
     if interrupt::is_raised() && found == 0 {
         return Err(Interrupted(format!("target found in 0 of {}", counted(all, "image"))).into());
     }
@@ -165,7 +98,47 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if interrupt::is_raised() {
         return Err(Interrupted(format!("poses of the first {}", counted(all, "image"))).into());
     }
-    Ok(if without > 0 { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })
+    Ok(if found < all { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })
+}
+
+impl Args {
+    /// Reads the targets, the sheet and the camera.
+    fn finder(&self) -> anyhow::Result<Finder> {
+        let limits = self.limits.limits();
+        let (printed, _) = self.grid.or_targets(&self.target, &limits)?;
+        let mut targets: Vec<Target> = printed.iter().map(|one| one.target.clone()).collect();
+        target_file::set_families(&mut targets, self.family.as_deref())?;
+        let scene = Reference::Scene(&targets);
+        let sheet = self.sheet.read(&limits, &scene.identities(), &printed)?;
+        if targets.len() > 1 {
+            // Rejects sheet options that apply to a single sheet.
+            sightings::panels(&scene, &sheet)?;
+        }
+        let each: Vec<&Target> = targets.iter().collect();
+        let detector = Detector::for_targets(&each, DetectorConfig::default());
+        let detector = detector.context("--target")?;
+        let camera = camera_file::read_for("--camera", &self.camera, &targets, self.assume_target)?;
+        for target in &targets {
+            if let Some(ambiguity) = Reference::Target(target).label_ambiguity() {
+                log!("note: {}: {ambiguity}", target.name);
+            }
+        }
+        Ok(Finder { detector, camera, targets, sheet, limits })
+    }
+
+    /// Returns the output file, if there is one, and its format.
+    fn file(&self) -> anyhow::Result<(Option<PathBuf>, PoseFormat)> {
+        let Some(path) = &self.output else { return Ok((None, PoseFormat::JsonLines)) };
+        let path = output::file_of(path, "poses", &["ndjson", "csv"])?;
+        let ending = path.extension().unwrap_or_default().to_string_lossy();
+        let format = PoseFormat::of_extension(&ending).context("-o: no format of poses")?;
+        let kind = match format {
+            PoseFormat::Csv => Kind::of(format.head().as_bytes()),
+            PoseFormat::JsonLines => Kind::of_schema(pose::SCHEMA),
+        };
+        self.overwrite.check(&path, &kind)?;
+        Ok((Some(path), format))
+    }
 }
 
 /// Finds targets in images of a known camera.
@@ -185,7 +158,56 @@ enum Seen {
     Unread(String),
 }
 
+impl Seen {
+    /// Whether any target was found.
+    fn is_there(&self) -> bool {
+        matches!(self, Self::Targets(found) if found.iter().any(Result::is_ok))
+    }
+}
+
 impl Finder {
+    /// Returns the result of an image and its lines; with `all_images`, also lines of targets without a pose. Reports why
+    /// there are none.
+    fn lines(
+        &self,
+        frame: Frame,
+        format: PoseFormat,
+        all_images: bool,
+    ) -> anyhow::Result<(Seen, String)> {
+        let (name, image, time_ns) = (frame.name(), frame.path().to_owned(), frame.time_ns());
+        let without = |target: &Target, why: &str| match all_images {
+            true => format.line_without(&name, time_ns, &target.name, why) + "\n",
+            false => String::new(),
+        };
+        let seen = self.find(frame, &name)?;
+        let mut lines = String::new();
+        match &seen {
+            Seen::Unread(why) => {
+                log!("error: {why}");
+                lines.extend(self.targets.iter().map(|target| without(target, why)));
+            }
+            Seen::Targets(found) => {
+                for (target, found) in self.targets.iter().zip(found) {
+                    match found {
+                        Ok(found) => {
+                            let views = found.cameras.iter().flat_map(|camera| &camera.views);
+                            let line = |view| format.line(found, view, time_ns, target) + "\n";
+                            lines.extend(views.map(line));
+                        }
+                        Err(why) => {
+                            // With several targets, an image need not show all of them.
+                            if !seen.is_there() {
+                                log!("{}: {}{why}", image.display(), self.of_target(target));
+                            }
+                            lines += &without(target, why);
+                        }
+                    }
+                }
+            }
+        }
+        Ok((seen, lines))
+    }
+
     /// Prefix of messages about a target, if there are several.
     fn of_target(&self, target: &Target) -> String {
         match self.targets.len() {

@@ -13,7 +13,7 @@
 //! 5. `solving` calls the library with a given or selected model, and prints the uncertainty of the result.
 //!    `constraints` are its options for fixed, equal and measured parameters; `compensation` selects the models, and compensates
 //!    views for rolling shutters and clocks.
-//! 6. `report_page` writes the report, with the photographs that it shows; `covariance_file`, the covariance.
+//! 6. `report_page` writes the files, and the report with the photographs that it shows; `covariance_file`, the covariance.
 //! 7. `compare` tests whether two results differ significantly.
 
 pub mod compare;

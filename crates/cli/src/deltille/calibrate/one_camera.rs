@@ -8,18 +8,17 @@ use anyhow::{Context, ensure};
 
 use super::compensation::{self, prepare};
 use super::reasons::no_board;
-use super::report_page::{check_images, note_missing};
+use super::report_page::{Outputs, check_images, note_missing};
 use super::sightings::{Empty, Sightings, SightingsArgs};
 use super::solving::{
-    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out, pose_uncertainty,
-    projection_uncertainty, richest, sample, with_constraints, without_outliers,
+    Calibrated, ModelChoice, SolveArgs, chosen, pose_uncertainty, projection_uncertainty, richest,
+    sample, with_constraints, without_outliers,
 };
 use crate::deltille::files::camera_file;
 use crate::deltille::files::written::{
-    File, check_places, keep_inputs, same_file, sample_of, text_file, write_all,
+    File, check_places, keep_inputs, same_file, sample_of, text_file,
 };
-use crate::interrupt;
-use crate::output::{self, Overwrite, log, report};
+use crate::output::{self, NamedFile, Overwrite, Place, log};
 use crate::run::{FAILED, report};
 use crate::values::format;
 use deltille::calibrate::{CameraEstimate, Estimate, Intrinsics, Model, PoseUncertainty, Source};
@@ -66,53 +65,14 @@ pub struct Args {
 
 /// Calibrates, writes the camera, and prints its quality.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    // Poses with a fixed camera must not replace its calibration.
-    let stem = if args.fixed_intrinsics.is_some() { "poses" } else { "camera" };
-    let place = output::place(args.output.as_deref().unwrap_or(Path::new(".")), &["yaml", "json"])?;
-    if let (Some(file), false) =
-        (&place.file, args.format.iter().any(|format| format.name() == "own"))
-    {
-        log!(
-            "note: {}.{} is not written, because --format does not contain own",
-            file.stem,
-            file.ending
-        );
-    }
-    check_images(args.images.iter())?;
-    ensure!(
-        !args.solve.residuals || args.format.iter().any(|format| format.is_own()),
-        "--residuals: the .json that lists them is written with --format own"
-    );
-    let stem = place.file.map_or(stem.to_owned(), |file| file.stem);
-    let path = place.folder.join(format!("{stem}.yaml"));
-    if let Some(known) = &args.fixed_intrinsics {
-        ensure!(
-            !same_file(&path, known),
-            "-o: {} is the camera of --fixed-intrinsics, and its uncertainties would be lost; use another name",
-            path.display()
-        );
-    }
+    let (folder, stem) = args.place()?;
     let candidates = args.candidates();
     let (intrinsics, known_with) = args.intrinsics(&candidates)?;
     args.solve.constraints.check_cameras(&[])?;
     args.solve.constraints.check(&stem, &intrinsics, &candidates)?;
-    let folder = output::folder_of(&path);
-    let sample = sample(&intrinsics);
-    let (planned, refused) =
-        args.files(&stem, (&sample, None), &[], &[], &sample_of(calibration::SCHEMA));
-    if let (true, Some(refused)) = (planned.is_empty(), refused.into_iter().next()) {
-        return Err(refused).context("--format");
-    }
-    let timing = args.solve.estimate_timing.then(|| compensation::planned(&stem));
-    let planned = planned.into_iter().chain(args.solve.planned(&stem)).chain(timing);
-    let planned: Vec<File> = planned.collect();
-    check_places(folder, &planned, args.overwrite)?;
-    keep_inputs(folder, &planned, args.sightings.target_files())?;
-    let page = args.solve.page(&stem, args.overwrite)?;
-    let own = path.with_extension("json");
-    let own: Vec<&Path> =
-        args.sightings.target_files().iter().chain([&own]).map(PathBuf::as_path).collect();
-    args.solve.covariance.check(args.overwrite, &own)?;
+    args.check_files(&folder, &stem, &intrinsics)?;
+    let target_files = args.sightings.target_files();
+    let outputs = Outputs::of(&args.solve, &folder, &stem, target_files, args.overwrite)?;
     let measure = args.solve.measures_target();
     let Sightings { calibration, views, printed, empty, left_out, print, detections, unnamed } =
         args.sightings.read(&intrinsics, measure, args.solve.estimate_timing)?;
@@ -123,13 +83,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let is_assumed = args.sightings.assumes_target();
         camera_file::check_or_note(known, &known_with, &targets, is_assumed)?;
     }
-    for Empty { path, reason } in &empty {
-        log!("{}: excluded: {}", path.display(), no_board(reason.as_ref()));
-    }
-    if empty.len() > views.len() {
-        let all = counted(empty.len() + views.len(), "image");
-        log!("warning: the target was found in only {} of {all}", views.len());
-    }
+    note_empty(&empty, views.len());
     if let Some(folder) = &args.images {
         note_missing(folder, &views);
     }
@@ -145,8 +99,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     solved.add_notes(0, &detections);
     unnamed.iter().for_each(|note| log!("{note}"));
     ensure!(!solved.estimate.frames.is_empty(), "no view is consistent with this camera");
-    let of_test = solved.estimate.held_out.iter().flat_map(|test| &test.excluded);
-    for out in solved.estimate.excluded.iter().chain(of_test) {
+    for out in solved.excluded() {
         log!("{}: excluded: {}", out.view, out.reason);
     }
     solved.estimate.excluded.splice(0..0, left_out);
@@ -155,52 +108,65 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         report(&foreign.context(format!("--fixed-intrinsics: {}", camera.display())));
         return Ok(ExitCode::from(FAILED));
     }
-    let Calibrated { estimate, diagnoses, print, .. } = &solved;
-    let (mut files, mut refused) = (Vec::new(), Vec::new());
-    let poses = estimate.pose_uncertainties(&targets);
-    for camera in &estimate.cameras {
-        let views = camera.views.iter().map(|view| (view.image.as_str(), view.pose));
-        let residuals = args.solve.residuals();
-        let json = calibration::write(estimate, diagnoses, *print, residuals, &poses);
-        let json = json.unwrap_or_default();
-        let views = views.collect::<Vec<_>>();
-        let of_camera = match camera.model {
-            Some(_) => &estimate.calibrated_with,
-            None => &known_with,
-        };
-        (files, refused) =
-            args.files(&stem, (&camera.camera, Some(camera)), of_camera, &views, &json);
-    }
+    let poses = solved.estimate.pose_uncertainties(&targets);
+    let (mut files, refused) = args.files_of(&solved, &stem, &known_with, &poses);
     files.extend(solved.measured(&stem, printed.first()).into_iter().chain(timing));
-    let mut written = write_all(folder, &files, args.overwrite)?;
-    if let Some(page) = page {
-        solved.write_page(&page, &stem, &[args.images.as_deref()], &poses, args.overwrite)?;
-        written.push(page);
+    let folders = [args.images.as_deref()];
+    let written = outputs.write(&solved, &files, &folders, &poses)?;
+    output::print(&(listed + &summary(&solved, &poses)))?;
+    solved.end(&written, &refused)
+}
+
+/// Reports images that do not show the target; `seen` others do.
+fn note_empty(empty: &[Empty], seen: usize) {
+    for Empty { path, reason } in empty {
+        log!("{}: excluded: {}", path.display(), no_board(reason.as_ref()));
     }
-    written.extend(args.solve.covariance.write(
-        &solved.estimate,
-        solved.has_failed(),
-        args.overwrite,
-    )?);
-    let mut text = listed + &table(&solved.estimate, &poses);
-    for line in solved.lines() {
-        text += &(line + "\n");
+    if empty.len() > seen {
+        let all = counted(empty.len() + seen, "image");
+        log!("warning: the target was found in only {seen} of {all}");
     }
-    if let Some(test) = &solved.estimate.held_out {
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "held out: {}", headline(test));
-    }
-    output::print(&text)?;
-    for path in written {
-        report!("{}", output::wrote(&path));
-    }
-    if interrupt::has_ended_input() {
-        return Ok(ExitCode::from(interrupt::exit_code()));
-    }
-    Ok(formats_left_out(&refused).unwrap_or(solved.exit_code()))
 }
 
 impl Args {
+    /// Returns the folder and the stem of the files.
+    fn place(&self) -> anyhow::Result<(PathBuf, String)> {
+        let output = self.output.as_deref().unwrap_or(Path::new("."));
+        let Place { folder, file } = output::place(output, &["yaml", "json"])?;
+        let writes_own = self.format.iter().any(|format| format.is_own());
+        if let (Some(NamedFile { stem, ending }), false) = (&file, writes_own) {
+            log!("note: {stem}.{ending} is not written, because --format does not contain own");
+        }
+        check_images(self.images.iter())?;
+        ensure!(
+            !self.solve.residuals || writes_own,
+            "--residuals: the .json that lists them is written with --format own"
+        );
+        // Poses with a fixed camera must not replace its calibration.
+        let stem = if self.fixed_intrinsics.is_some() { "poses" } else { "camera" };
+        let stem = file.map_or(stem.to_owned(), |file| file.stem);
+        let path = folder.join(format!("{stem}.yaml"));
+        ensure!(
+            !self.fixed_intrinsics.as_ref().is_some_and(|known| same_file(&path, known)),
+            "-o: {} is the camera of --fixed-intrinsics, and its uncertainties would be lost; use another name",
+            path.display()
+        );
+        Ok((folder, stem))
+    }
+
+    /// Rejects files that could not be written, before the work starts.
+    fn check_files(&self, folder: &Path, stem: &str, camera: &Intrinsics) -> anyhow::Result<()> {
+        let json = sample_of(calibration::SCHEMA);
+        let (mut files, refused) = self.files(stem, (&sample(camera), None), &[], &[], &json);
+        if let (true, Some(refused)) = (files.is_empty(), refused.into_iter().next()) {
+            return Err(refused).context("--format");
+        }
+        files.extend(self.solve.planned(stem));
+        files.extend(self.solve.estimate_timing.then(|| compensation::planned(stem)));
+        check_places(folder, &files, self.overwrite)?;
+        keep_inputs(folder, &files, self.sightings.target_files())
+    }
+
     /// Returns the intrinsics, and the targets that the camera was calibrated with.
     fn intrinsics(
         &self,
@@ -219,6 +185,29 @@ impl Args {
             self.files("", (camera, None), &[], &[], &sample_of(calibration::SCHEMA)).1.is_empty()
         };
         self.model.unwrap_or(ModelChoice::Auto).candidates(is_supported)
+    }
+
+    /// Returns the estimated camera in all requested formats, and errors for those that failed; a known camera was
+    /// calibrated with the targets `known_with`.
+    fn files_of(
+        &self,
+        solved: &Calibrated,
+        stem: &str,
+        known_with: &[TargetIdentity],
+        poses: &[PoseUncertainty],
+    ) -> (Vec<File>, Vec<FormatError>) {
+        let Calibrated { estimate, diagnoses, print, .. } = solved;
+        let Some(camera) = estimate.cameras.first() else { return (Vec::new(), Vec::new()) };
+        let residuals = self.solve.residuals();
+        let json = calibration::write(estimate, diagnoses, *print, residuals, poses);
+        let views = camera.views.iter().map(|view| (view.image.as_str(), view.pose));
+        let calibrated_with = match camera.model {
+            Some(_) => &estimate.calibrated_with,
+            None => known_with,
+        };
+        let of_camera = (&camera.camera, Some(camera));
+        let json = json.unwrap_or_default();
+        self.files(stem, of_camera, calibrated_with, &views.collect::<Vec<_>>(), &json)
     }
 
     /// Returns the camera in all requested formats, and errors for those that failed; `found` is its estimate, and `json`
@@ -261,11 +250,17 @@ impl Args {
     }
 }
 
-/// Formats the parameters with their standard deviations, and the views with their errors.
-fn table(estimate: &Estimate, poses: &[PoseUncertainty]) -> String {
-    let cameras = estimate.cameras.iter();
+/// Formats the parameters with their standard deviations, the views with their errors, and the properties of the target.
+fn summary(solved: &Calibrated, poses: &[PoseUncertainty]) -> String {
+    let estimate = &solved.estimate;
     let poses: String = pose_uncertainty(estimate, poses).map(|line| line + "\n").collect();
-    cameras.map(|camera| of_camera(camera, &poses)).collect::<String>() + &headline(estimate) + "\n"
+    let mut text: String =
+        estimate.cameras.iter().map(|camera| of_camera(camera, &poses)).collect();
+    let held_out = estimate.held_out.iter().map(|test| format!("held out: {}", headline(test)));
+    for line in [headline(estimate)].into_iter().chain(solved.lines()).chain(held_out) {
+        text += &(line + "\n");
+    }
+    text
 }
 
 fn of_camera(camera: &CameraEstimate, poses: &str) -> String {

@@ -1,11 +1,13 @@
-//! The report of a calibration, with the photographs that it shows.
+//! The files of a calibration: those of the cameras, the report with the photographs that it shows, and the covariance.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
-use super::solving::Calibrated;
+use super::covariance_file::CovarianceArgs;
+use super::solving::{Calibrated, SolveArgs};
+use crate::deltille::files::written::{File, write_all};
 use crate::output::{self, Overwrite, log};
 use deltille::calibrate::{PoseUncertainty, View, ViewEstimate};
 use deltille::photograph;
@@ -17,9 +19,56 @@ use deltille_core::words::counted;
 /// Largest number of thumbnails of held-out views.
 const MAX_HELD_OUT: usize = 100;
 
+/// Where a calibration is written.
+pub struct Outputs<'a> {
+    folder: &'a Path,
+    stem: &'a str,
+    covariance: &'a CovarianceArgs,
+    /// The report, if requested.
+    page: Option<PathBuf>,
+    overwrite: Overwrite,
+}
+
+impl<'a> Outputs<'a> {
+    /// Rejects unusable paths of the covariance and the report (`<stem>-report.html` in a folder), before the work starts;
+    /// `targets` are the files of the targets.
+    pub fn of(
+        SolveArgs { covariance, report, .. }: &'a SolveArgs,
+        folder: &'a Path,
+        stem: &'a str,
+        targets: &[PathBuf],
+        overwrite: Overwrite,
+    ) -> anyhow::Result<Self> {
+        let own = folder.join(format!("{stem}.json"));
+        let own: Vec<&Path> = targets.iter().chain([&own]).map(PathBuf::as_path).collect();
+        covariance.check(overwrite, &own)?;
+        let name = format!("{stem}-report");
+        let page = report.as_deref().map(|page| output::page(page, &name, overwrite));
+        Ok(Self { folder, stem, covariance, page: page.transpose()?, overwrite })
+    }
+
+    /// Writes files, the report with photographs from the folder of each camera, and the covariance; returns their paths.
+    pub fn write(
+        &self,
+        solved: &Calibrated,
+        files: &[File],
+        folders: &[Option<&Path>],
+        poses: &[PoseUncertainty],
+    ) -> anyhow::Result<Vec<PathBuf>> {
+        let &Self { folder, stem, covariance, overwrite, .. } = self;
+        let mut written = write_all(folder, files, overwrite)?;
+        if let Some(page) = &self.page {
+            solved.write_page(page, stem, folders, poses, overwrite)?;
+            written.push(page.clone());
+        }
+        written.extend(covariance.write(&solved.estimate, solved.has_failed(), overwrite)?);
+        Ok(written)
+    }
+}
+
 impl Calibrated {
     /// Writes the report; `folders` contains the photograph folder of each camera.
-    pub fn write_page(
+    fn write_page(
         &self,
         page: &Path,
         title: &str,

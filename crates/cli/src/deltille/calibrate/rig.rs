@@ -6,33 +6,33 @@ use std::process::ExitCode;
 
 use anyhow::{Context, anyhow, bail, ensure};
 
-use super::compensation::{self, AllFrames, prepare, times_ns};
+use super::compensation::{self, AllFrames, Times, prepare, times_ns};
 use super::detection_files::is_same;
 use super::filming::{self, Given};
-use super::report_page::{check_images, note_missing};
+use super::report_page::{Outputs, check_images, note_missing};
 use super::rig_cameras::{CamerasArgs, Source, check_named, follow, named};
 use super::sightings::{self, GridArgs, SheetArgs, check_every};
 use super::solving::{
-    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out, pose_uncertainty,
-    projection_uncertainty, richest, sample, with_constraints, within, without_outliers,
+    Calibrated, ModelChoice, SolveArgs, chosen, pose_uncertainty, projection_uncertainty, richest,
+    sample, with_constraints, within, without_outliers,
 };
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::written::{
-    File, check_places, keep_inputs, same_file, sample_of, text_file, write_all,
+    File, check_places, keep_inputs, same_file, sample_of, text_file,
 };
 use crate::deltille::files::{camera_file, target_file};
-use crate::interrupt;
-use crate::output::{self, Overwrite, fixed, log, report, say};
+use crate::output::{self, Overwrite, fixed, log, say};
 use crate::run::{FAILED, report};
 use crate::values::format;
 use deltille::calibrate::{
     Calibration, CameraEstimate, CameraViews, Estimate, Excluded, Intrinsics, Model,
-    PoseUncertainty, Reference, TargetMap,
+    PoseUncertainty, Reference, TargetMap, View,
 };
 use deltille::camera::{Camera, CameraFile, Pose};
 use deltille::detect::{Detection, InkEstimate};
 use deltille::export::calibration::Print;
 use deltille::export::camera::FormatError;
+use deltille::export::sheet::Sheet;
 use deltille::export::{RIG_FORMATS, RigFile, RigFormat, rig, saved};
 use deltille::layout::Printing;
 use deltille::limits::Limits;
@@ -99,20 +99,9 @@ pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
     args.stem = place.file.map_or(args.stem, |file| file.stem);
     let sources = args.cameras.sources(&[], args.refine_target)?;
     let names: Vec<&str> = sources.iter().map(|source| source.name.as_str()).collect();
-    for (option, given) in [("--known", &args.known), ("--images", &args.images)] {
-        check_named(option, given.iter().map(|(name, _)| name.as_str()), &names)?;
-    }
-    check_images(args.images.iter().map(|(_, path)| path))?;
-    ensure!(
-        !names.contains(&args.stem.as_str()),
-        "-o: {0}.json is not a file of the rig, because one of its cameras is called {0}; use another name",
-        args.stem
-    );
+    args.check_names(&names)?;
     let limits = args.limits.limits();
-    let (mut printed, grid) = match args.grid.read_target()? {
-        Some((grid, target)) => (vec![target.into()], Some(grid)),
-        None => (target_file::read_all_placed(&args.target, &limits).context("--target")?, None),
-    };
+    let (mut printed, grid) = args.grid.or_targets(&args.target, &limits)?;
     target_file::set_given_family(&mut printed, args.family.as_deref())?;
     let targets: Vec<Target> = printed.iter().map(|one| one.target.clone()).collect();
     let reference = sightings::reference(grid, &targets);
@@ -128,47 +117,20 @@ pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
         checked.with_context(|| format!("camera {name}"))?;
     }
     args.check_files(&names, &cameras, &printed)?;
-    let own = args.output.join(format!("{}.json", args.stem));
-    let own: Vec<&Path> = args.target.iter().chain([&own]).map(PathBuf::as_path).collect();
-    args.solve.covariance.check(args.overwrite, &own)?;
-    let page = args.solve.page(&args.stem, args.overwrite)?;
+    let outputs = Outputs::of(&args.solve, &args.output, &args.stem, &args.target, args.overwrite)?;
+    let given = args.given(&sources, &reference, &cameras, &limits)?;
+    let mut seen = Seen::default();
     let mut calibration = Calibration::of(&reference, panels).refine_panels(args.refine_target);
-    let (mut left_out, mut ink, mut seen) = (Vec::new(), Vec::new(), Vec::new());
-    let (given, mut times) = (args.given(&sources, &reference, &cameras, &limits)?, Vec::new());
-    for ((Source { name, option, .. }, given), intrinsics) in sources.iter().zip(given).zip(cameras)
-    {
-        let read = sightings::views_of(given, &reference, args.assume_target);
-        let read = read.and_then(sightings::shown);
-        let sightings::Read { mut views, left_out: out, ink: of_camera, detections, .. } =
-            read.with_context(|| option.clone())?;
-        check_own(option, &detections, &seen)?;
-        if args.solve.estimate_timing {
-            let times_ns = times_ns(&detections).with_context(|| option.clone());
-            times.push(times_ns.context("--estimate-timing")?);
-        }
-        seen.push((name, detections));
-        let of_camera_out = |out: Vec<Excluded>| {
-            out.into_iter().map(|out| Excluded { camera: Some(name.clone()), ..out })
-        };
-        left_out.extend(of_camera_out(sightings::take_known(&mut views, &reference)));
-        if args.solve.measures_target() {
-            let unsure = sightings::take_sure(&mut views, &reference)?;
-            left_out.extend(of_camera_out(unsure));
-        }
-        sightings::put_on(&sheet, reference.targets().first(), &mut views)?;
-        left_out.extend(of_camera_out(out));
-        ink.extend(of_camera);
-        if let Some(folder) = of_name(&args.images, name) {
-            note_missing(folder, &views);
-        }
-        let constraints = args.solve.constraints.of(name, &intrinsics);
-        let camera_from_rig = known_poses.get(name.as_str()).copied();
-        let camera = CameraViews::new(name, views, intrinsics);
-        let camera = CameraViews { constraints, camera_from_rig, ..camera };
-        calibration = calibration.with(camera);
+    for ((source, given), intrinsics) in sources.iter().zip(given).zip(cameras) {
+        let views = args.views(source, given, &reference, &sheet, &mut seen)?;
+        let constraints = args.solve.constraints.of(&source.name, &intrinsics);
+        let camera_from_rig = known_poses.get(&source.name).copied();
+        let camera = CameraViews::new(&source.name, views, intrinsics);
+        calibration = calibration.with(CameraViews { constraints, camera_from_rig, ..camera });
     }
+    let Seen { detections, left_out, ink, times_ns } = seen;
     let frames = args.solve.estimate_timing.then(|| AllFrames {
-        times_ns: times,
+        times_ns,
         most: args.cameras.views.unwrap_or(filming::VIEWS) as usize,
     });
     let options: Vec<String> = sources.iter().map(|source| source.option.clone()).collect();
@@ -179,15 +141,14 @@ pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
     let timing = prepared.file(&args.stem);
     let print = Print { scale: sheet.print_scale, ink: InkEstimate::of_all(&ink) };
     let mut solved = args.solve.solve(calibration, print, prepared.tried)?;
-    for (index, (_, detections)) in seen.iter().enumerate() {
+    for (index, (_, detections)) in detections.iter().enumerate() {
         solved.add_notes(index, detections);
     }
-    let detections = seen.iter().flat_map(|(_, detections)| detections);
+    let detections = detections.iter().flat_map(|(_, detections)| detections);
     if let (Some(note), false) = (sightings::unnamed(detections, &reference), args.assume_target) {
         log!("{note}");
     }
-    let of_test = solved.estimate.held_out.iter().flat_map(|test| &test.excluded);
-    for out in solved.estimate.excluded.iter().chain(of_test) {
+    for out in solved.excluded() {
         log!("{}: excluded: {}", out.shown(), out.reason);
     }
     if let Err(foreign) = solved.print_diagnoses() {
@@ -197,38 +158,75 @@ pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
     let poses = solved.estimate.pose_uncertainties(&targets);
     text += &summary(&solved, &poses);
     solved.estimate.excluded.splice(0..0, left_out);
-    let Calibrated { estimate, diagnoses, print, .. } = &solved;
-    let residuals = args.solve.residuals();
-    let json = rig::write(estimate, diagnoses, &args.model.name(), *print, residuals, &poses);
-    let cameras = estimate.cameras.iter();
-    let cameras = cameras.map(|c| (c.name.as_str(), &c.camera, c.camera_from_rig));
-    let cameras = cameras.collect::<Vec<_>>();
-    let (mut files, refused) = args.files(&cameras, &json, estimate, &printed)?;
+    let (mut files, refused) = args.files_of(&solved, &poses, &printed)?;
     files.extend(timing);
-    let mut written = write_all(&args.output, &files, args.overwrite)?;
-    if let Some(page) = page {
-        let folders: Vec<_> = names.iter().map(|name| of_name(&args.images, name)).collect();
-        solved.write_page(&page, &args.stem, &folders, &poses, args.overwrite)?;
-        written.push(page);
-    }
-    written.extend(args.solve.covariance.write(
-        &solved.estimate,
-        solved.has_failed(),
-        args.overwrite,
-    )?);
+    let folders: Vec<_> = names.iter().map(|name| of_name(&args.images, name)).collect();
+    let written = outputs.write(&solved, &files, &folders, &poses)?;
     for line in text.lines() {
         say!("{line}");
     }
-    for path in written {
-        report!("{}", output::wrote(&path));
-    }
-    if interrupt::has_ended_input() {
-        return Ok(ExitCode::from(interrupt::exit_code()));
-    }
-    Ok(formats_left_out(&refused).unwrap_or(solved.exit_code()))
+    solved.end(&written, &refused)
+}
+
+/// What the images of all cameras show, except the views.
+#[derive(Default)]
+struct Seen<'a> {
+    /// Names of the cameras, and their detections.
+    detections: Vec<(&'a String, Vec<(String, Detection)>)>,
+    left_out: Vec<Excluded>,
+    ink: Vec<InkEstimate>,
+    /// By camera, if all frames are used.
+    times_ns: Vec<Times>,
 }
 
 impl Args {
+    /// Rejects options for other cameras, and names of cameras or of the rig that are ambiguous.
+    fn check_names(&self, names: &[&str]) -> anyhow::Result<()> {
+        for (option, given) in [("--known", &self.known), ("--images", &self.images)] {
+            check_named(option, given.iter().map(|(name, _)| name.as_str()), names)?;
+        }
+        check_images(self.images.iter().map(|(_, path)| path))?;
+        ensure!(
+            !names.contains(&self.stem.as_str()),
+            "-o: {0}.json is not a file of the rig, because one of its cameras is called {0}; use another name",
+            self.stem
+        );
+        Ok(())
+    }
+
+    /// Returns the views of a camera that are used, and adds everything else in its detections to `seen`.
+    fn views<'a>(
+        &self,
+        Source { name, option, .. }: &'a Source,
+        given: Given,
+        reference: &Reference,
+        sheet: &Sheet,
+        seen: &mut Seen<'a>,
+    ) -> anyhow::Result<Vec<View>> {
+        let read = sightings::views_of(given, reference, self.assume_target);
+        let read = read.and_then(sightings::shown).with_context(|| option.clone())?;
+        let sightings::Read { mut views, left_out: foreign, ink, detections, .. } = read;
+        check_own(option, &detections, &seen.detections)?;
+        if self.solve.estimate_timing {
+            let times_ns = times_ns(&detections).with_context(|| option.clone());
+            seen.times_ns.push(times_ns.context("--estimate-timing")?);
+        }
+        seen.detections.push((name, detections));
+        let mut left_out = sightings::take_known(&mut views, reference);
+        if self.solve.measures_target() {
+            left_out.extend(sightings::take_sure(&mut views, reference)?);
+        }
+        sightings::put_on(sheet, reference.targets().first(), &mut views)?;
+        left_out.extend(foreign);
+        let left_out = left_out.into_iter();
+        seen.left_out.extend(left_out.map(|out| Excluded { camera: Some(name.clone()), ..out }));
+        seen.ink.extend(ink);
+        if let Some(folder) = of_name(&self.images, name) {
+            note_missing(folder, &views);
+        }
+        Ok(views)
+    }
+
     /// Returns the known poses of cameras relative to the first one, by name.
     fn known_poses(&self, names: &[&str]) -> anyhow::Result<BTreeMap<String, Pose>> {
         let Some(path) = &self.known_poses else { return Ok(BTreeMap::new()) };
@@ -316,6 +314,20 @@ impl Args {
         files.extend(self.solve.estimate_timing.then(|| compensation::planned(&self.stem)));
         check_places(&self.output, &files, self.overwrite)?;
         keep_inputs(&self.output, &files, &self.target)
+    }
+
+    /// Returns all files of a calibrated rig, and errors for the formats that failed.
+    fn files_of(
+        &self,
+        Calibrated { estimate, diagnoses, print, .. }: &Calibrated,
+        poses: &[PoseUncertainty],
+        printed: &[Printing],
+    ) -> anyhow::Result<(Vec<File>, Vec<FormatError>)> {
+        let residuals = self.solve.residuals();
+        let json = rig::write(estimate, diagnoses, &self.model.name(), *print, residuals, poses);
+        let cameras = estimate.cameras.iter();
+        let cameras = cameras.map(|c| (c.name.as_str(), &c.camera, c.camera_from_rig));
+        self.files(&cameras.collect::<Vec<_>>(), &json, estimate, printed)
     }
 
     /// Returns all files, and errors for the formats that failed; `json` is the complete result.

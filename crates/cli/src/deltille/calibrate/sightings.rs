@@ -186,6 +186,18 @@ impl GridArgs {
             .context("--grid needs --rows and --cols to identify the corners")?;
         Ok(Some((grid, made.context("--grid")?)))
     }
+
+    /// Returns the board and the target made from it, if given, otherwise the targets in `files`.
+    pub fn or_targets(
+        &self,
+        files: &[PathBuf],
+        limits: &Limits,
+    ) -> anyhow::Result<(Vec<Printing>, Option<UntaggedGrid>)> {
+        Ok(match self.read_target()? {
+            Some((grid, target)) => (vec![target.into()], Some(grid)),
+            None => (target_file::read_all_placed(files, limits).context("--target")?, None),
+        })
+    }
 }
 
 impl SightingsArgs {

@@ -12,13 +12,14 @@ use clap::ValueEnum;
 use super::constraints::ConstraintArgs;
 use super::covariance_file::CovarianceArgs;
 use crate::deltille::files::written::{File, sample_of, text_file};
-use crate::output::{self, Overwrite, fixed, log};
+use crate::interrupt;
+use crate::output::{self, fixed, log, report};
 use crate::progress::Spinner;
 use crate::run::FAILED;
 use crate::values::{distance, whole};
 use deltille::calibrate::{
     BoardShape, Calibration, CalibrationError, CameraEstimate, Candidate, Diagnosis, Estimate,
-    Intrinsics, Loss, MIN_VIEWS_TO_MEASURE, Messages, Model, ModelError, PanelPrior,
+    Excluded, Intrinsics, Loss, MIN_VIEWS_TO_MEASURE, Messages, Model, ModelError, PanelPrior,
     PoseUncertainty, Source, TargetMap, Weights,
 };
 use deltille::camera::Camera;
@@ -73,7 +74,7 @@ pub struct SolveArgs {
     pub covariance: CovarianceArgs,
     /// Write an HTML report on the quality of the calibration, and how to improve it
     #[arg(long, value_name = "FILE.html")]
-    report: Option<PathBuf>,
+    pub report: Option<PathBuf>,
 }
 
 /// Robust loss of corners.
@@ -295,13 +296,6 @@ impl SolveArgs {
         let models = tried.into_iter().enumerate().map(compared).collect();
         Ok(Calibrated { estimate, diagnoses, stated, print, models, notes: BTreeMap::new() })
     }
-
-    /// Returns the path of the report (`<stem>-report.html` in a folder). Rejects unusable paths before the work
-    /// starts.
-    pub fn page(&self, stem: &str, overwrite: Overwrite) -> anyhow::Result<Option<PathBuf>> {
-        let stem = format!("{stem}-report");
-        self.report.as_deref().map(|page| output::page(page, &stem, overwrite)).transpose()
-    }
 }
 
 /// Prints diagnoses on standard error.
@@ -333,12 +327,28 @@ impl Calibrated {
         Ok(())
     }
 
-    /// Returns exit code 1 if the result must not be used unchanged.
-    pub fn exit_code(&self) -> ExitCode {
-        match self.has_failed() {
+    /// Returns the views that were excluded, also from the held-out frames.
+    pub fn excluded(&self) -> impl Iterator<Item = &Excluded> {
+        let of_test = self.estimate.held_out.iter().flat_map(|test| &test.excluded);
+        self.estimate.excluded.iter().chain(of_test)
+    }
+
+    /// Reports the written files and the formats that cannot represent the result. Returns exit code 1 if the output is
+    /// incomplete, or must not be used unchanged.
+    pub fn end(&self, written: &[PathBuf], refused: &[FormatError]) -> anyhow::Result<ExitCode> {
+        for path in written {
+            report!("{}", output::wrote(path));
+        }
+        if interrupt::has_ended_input() {
+            return Ok(ExitCode::from(interrupt::exit_code()));
+        }
+        for error in refused {
+            log!("error: --format: {error}; skipped, all other files were written");
+        }
+        Ok(match !refused.is_empty() || self.has_failed() {
             true => ExitCode::from(FAILED),
             false => ExitCode::SUCCESS,
-        }
+        })
     }
 
     /// Whether the result must not be used unchanged.
@@ -377,15 +387,6 @@ impl Calibrated {
         let map = self.estimate.map.as_ref().map(|map| mapped(map, views));
         poses.chain(shape).chain(map).chain(ink).collect()
     }
-}
-
-/// Reports formats that cannot represent the result; returns exit code 1 if there are any, because the output is
-/// incomplete.
-pub fn left_out(refused: &[FormatError]) -> Option<ExitCode> {
-    for error in refused {
-        log!("error: --format: {error}; skipped, all other files were written");
-    }
-    (!refused.is_empty()).then(|| ExitCode::from(FAILED))
 }
 
 /// Parses the standard deviation of a board's corners, mm.
