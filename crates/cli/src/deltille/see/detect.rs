@@ -8,13 +8,15 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 use anyhow::{Context, bail, ensure};
+use rayon::ThreadPool;
 
 use super::detector_options::FinderArgs;
+use super::outcomes::{Found, Outcome, Report, row_of};
 use crate::deltille::files::detection_tables::{self, Tables};
 use crate::deltille::files::images::{Images, RecordingArgs, Stems};
 use crate::deltille::files::images_at_once;
 use crate::output::{self, NamedFile, Overwrite, Place, detail, log};
-use crate::run::{self, BAD_INPUT, FAILED, Interrupted};
+use crate::run::Interrupted;
 use crate::values::{format, whole};
 use crate::{interrupt, progress, terminal};
 use deltille::clock;
@@ -23,7 +25,7 @@ use deltille::export::kind::Kind;
 use deltille::export::named::Format;
 use deltille::export::tables::ImageRecord;
 use deltille::export::{DETECTION_FORMATS, DetectionFormat, atomic, detection, overlay};
-use deltille::frames::{Frame, is_recording};
+use deltille::frames::{Frame, FrameOptions, is_recording};
 use deltille::photograph::Photograph;
 use deltille::raster::AnyGray;
 use deltille::targets::Target;
@@ -101,29 +103,30 @@ impl ImageDetector {
     }
 }
 
-/// Outcome of an image.
-enum Outcome {
-    Seen(Box<Found>),
-    Skipped,
-}
-
-/// Detections in an image.
-struct Found {
-    /// The line to print.
-    line: String,
-    /// The ink spread estimated from the image.
-    ink: Option<InkEstimate>,
-    /// Whether the requested target or grid was found.
-    is_there: bool,
-    /// The table row, if tables are written.
-    row: Option<ImageRecord>,
-}
-
 /// A processed image.
 struct Seen {
     /// Index among all images.
     index: usize,
     ink: Option<InkEstimate>,
+}
+
+/// Outcome of the first pass over all images.
+#[derive(Default)]
+struct FirstPass {
+    /// Processed images, in their order.
+    seen: Vec<Seen>,
+    /// Indices of the other images, with their table rows if they have one.
+    unseen: Vec<(usize, Option<ImageRecord>)>,
+}
+
+/// The images, and what both passes over them share.
+struct Work<'a> {
+    args: &'a Args,
+    targets: &'a [Target],
+    images: &'a Images,
+    options: FrameOptions,
+    threads: ThreadPool,
+    report: Report,
 }
 
 /// Detects targets in all images. Images that cannot be read are reported, and the others are processed.
@@ -150,100 +153,31 @@ pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
             .with_context(|| format!("-o: cannot write to {}", folder.display()))?;
         output::settle(folder).context("-o")?;
     }
-    let limits = args.finder.limits();
-    let options = args.recording.options(limits, &images)?;
-    let folder = args.tables();
-    let earlier = match folder {
-        Some(folder) => {
-            detection_tables::check(folder, args.overwrite)?;
-            if args.skip_existing {
-                detection_tables::earlier(folder, &limits)?
-            } else {
-                Vec::new()
-            }
-        }
-        None => Vec::new(),
-    };
-    let done: BTreeSet<&str> = earlier
-        .iter()
-        .filter(|picture| picture.found.is_ok())
-        .map(|picture| picture.image.as_str())
-        .collect();
-    let tables = folder.map(|folder| Tables::begin(folder, &targets)).transpose()?;
+    let options = args.recording.options(args.finder.limits(), &images)?;
+    let earlier = args.earlier()?;
+    let tables = args.begin_tables(&targets)?;
     if tables.is_some() {
         // Existing rows are kept.
         interrupt::keeps_results();
     }
-
-    let bar = progress::bar(images.count().unwrap_or(0) as u64, "images");
     // Frames of a video are processed in order.
     let jobs = if args.track { 1 } else { args.jobs.unwrap_or(0) };
-    let threads = rayon::ThreadPoolBuilder::new().num_threads(jobs.into());
-    // Sequential, so that of two images with the same stem the later one is always rejected.
-    let mut stems = Stems::default();
-    let claimed = images.frames(&options, true).map(|frame| {
-        let frame = frame?;
-        stems.claim_stem(&frame.stem(), frame.path())?;
-        Ok(frame)
-    });
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(jobs.into()).build()?;
     let go_on = if args.stream { "" } else { "; resume with --skip-existing" };
     let report = Report::new(images.is_single(), terminal::is_quiet() && !args.stream, go_on);
-    let seen: Mutex<Vec<Seen>> = Mutex::default();
-    // Rows of images that were not processed, if they have one.
-    let unseen: Mutex<Vec<(usize, Option<ImageRecord>)>> = Mutex::default();
-    let threads = threads.build()?;
-    images_at_once::for_each(&threads, &limits, claimed, |index, frame| {
-        if interrupt::is_raised() {
-            return;
-        }
-        let name = frame.as_ref().ok().map(Frame::name);
-        let mut result = frame.and_then(|frame| {
-            let stem = frame.stem();
-            args.check_results(&stem)?;
-            if args.skip_existing
-                && args.results(&stem).iter().all(|(path, _)| path.exists())
-                && (folder.is_none() || done.contains(frame.name().as_str()))
-            {
-                return Ok(Outcome::Skipped);
-            }
-            let start = Instant::now();
-            let found = one_image(&args, &targets, &finder, frame)?;
-            detail!(
-                "{}: {:.1} ms",
-                name.as_deref().unwrap_or(&stem),
-                1e3 * start.elapsed().as_secs_f64()
-            );
-            let looked_at = Seen { index, ink: found.ink };
-            seen.lock().expect("no thread panics here").push(looked_at);
-            Ok(Outcome::Seen(Box::new(found)))
-        });
-        if let Some(tables) = &tables {
-            let row = row_of(name, &mut result);
-            if !matches!(result, Ok(Outcome::Seen(_))) {
-                unseen.lock().expect("no thread panics here").push((index, row.clone()));
-            }
-            tables.add(index, row);
-        }
-        bar.inc(1);
-        bar.suspend(|| report.add(index, result));
-    });
-    bar.finish_and_clear();
-    let mut seen = seen.into_inner().expect("no thread panics here");
-    // Sorted by image order, independent of the order of completion.
-    seen.sort_unstable_by_key(|seen| seen.index);
+    let work = Work { args: &args, targets: &targets, images: &images, options, threads, report };
+    let first = work.see(&finder, tables.as_ref(), &earlier);
     let mut again = None;
     if args.stream {
-        note_ink_of_all(&finder.detector, &seen);
+        note_ink_of_all(&finder.detector, &first.seen);
     } else if !interrupt::is_raised() {
-        let unseen = unseen.into_inner().expect("no thread panics here");
-        let frames = images.frames(&options, false);
-        again =
-            see_again(&args, &targets, &finder.detector, &seen, frames, unseen, &threads, &report)?;
+        again = work.see_again(&finder.detector, first)?;
     }
     if let Some(tables) = tables {
         let is_left = interrupt::is_raised();
         // An interrupted run does not replace a complete one, unless it resumes it.
-        let stays = is_left && !args.skip_existing && folder.is_some_and(detection_tables::are_in);
+        let stays =
+            is_left && !args.skip_existing && args.tables().is_some_and(detection_tables::are_in);
         match again.filter(|_| !is_left) {
             _ if stays => {}
             Some(again) => again.finish(&earlier)?,
@@ -255,9 +189,133 @@ pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
         let _ = fs::remove_dir(folder);
     }
     if interrupt::is_raised() {
-        return Err(Interrupted(report.status()).into());
+        return Err(Interrupted(work.report.status()).into());
     }
-    report.end()
+    work.report.end()
+}
+
+impl Work<'_> {
+    /// Processes all images, except those with results if these are kept; `earlier` are the rows of their tables.
+    fn see(
+        &self,
+        finder: &ImageDetector,
+        tables: Option<&Tables>,
+        earlier: &[ImageRecord],
+    ) -> FirstPass {
+        let done = earlier.iter().filter(|picture| picture.found.is_ok());
+        let done: BTreeSet<&str> = done.map(|picture| picture.image.as_str()).collect();
+        let bar = progress::bar(self.images.count().unwrap_or(0) as u64, "images");
+        // Sequential, so that of two images with the same stem the later one is always rejected.
+        let mut stems = Stems::default();
+        let claimed = self.images.frames(&self.options, true).map(|frame| {
+            let frame = frame?;
+            stems.claim_stem(&frame.stem(), frame.path())?;
+            Ok(frame)
+        });
+        let pass: Mutex<FirstPass> = Mutex::default();
+        self.for_each(claimed, |index, frame| {
+            let name = frame.as_ref().ok().map(Frame::name);
+            let mut result = frame.and_then(|frame| self.outcome(finder, frame, &done));
+            let row = row_of(name, &mut result);
+            {
+                let mut pass = pass.lock().expect("no thread panics here");
+                match &result {
+                    Ok(Outcome::Seen(found)) => pass.seen.push(Seen { index, ink: found.ink }),
+                    _ => pass.unseen.push((index, row.clone())),
+                }
+            }
+            if let Some(tables) = tables {
+                tables.add(index, row);
+            }
+            bar.inc(1);
+            bar.suspend(|| self.report.add(index, result));
+        });
+        bar.finish_and_clear();
+        let mut pass = pass.into_inner().expect("no thread panics here");
+        // Sorted by image order, independent of the order of completion.
+        pass.seen.sort_unstable_by_key(|seen| seen.index);
+        pass
+    }
+
+    /// Processes an image, unless it has results that are kept; `done` are the images in tables.
+    fn outcome(
+        &self,
+        finder: &ImageDetector,
+        frame: Frame,
+        done: &BTreeSet<&str>,
+    ) -> anyhow::Result<Outcome> {
+        let Self { args, targets, .. } = self;
+        let (name, stem) = (frame.name(), frame.stem());
+        args.check_results(&stem)?;
+        if args.skip_existing
+            && args.results(&stem).iter().all(|(path, _)| path.exists())
+            && (args.tables().is_none() || done.contains(name.as_str()))
+        {
+            return Ok(Outcome::Skipped);
+        }
+        let start = Instant::now();
+        let found = one_image(args, targets, finder, frame)?;
+        detail!("{name}: {:.1} ms", 1e3 * start.elapsed().as_secs_f64());
+        Ok(Outcome::Seen(Box::new(found)))
+    }
+
+    /// Processes all images a second time with the joint ink estimate, because a single image may constrain the ink
+    /// poorly. Rewrites the tables, with the rows of images that were not processed.
+    fn see_again(
+        &self,
+        detector: &Detector,
+        FirstPass { seen, unseen }: FirstPass,
+    ) -> anyhow::Result<Option<Tables>> {
+        let found: Vec<Option<InkEstimate>> = seen.iter().map(|seen| seen.ink).collect();
+        let known: Vec<InkEstimate> = found.iter().copied().flatten().collect();
+        let Some(ink) = InkEstimate::of_all(&known).filter(|ink| ink.used) else { return Ok(None) };
+        let mut tables = None;
+        if let Some(detector) = detector.with_ink_of(&found) {
+            let finder = ImageDetector::of(self.args, detector);
+            let bar =
+                progress::bar(seen.len() as u64, "images, second pass with joint ink estimate");
+            let mut wanted = seen.iter().map(|seen| seen.index).peekable();
+            let frames = self.images.frames(&self.options, false).enumerate();
+            let frames = frames.filter(|(index, _)| wanted.next_if_eq(index).is_some());
+            tables = self.args.begin_tables(self.targets)?;
+            if let Some(table) = &tables {
+                unseen.into_iter().for_each(|(index, row)| table.add(index, row));
+            }
+            self.for_each(frames.map(|(_, frame)| frame), |index, frame| {
+                let name = frame.as_ref().ok().map(Frame::name);
+                let again =
+                    frame.and_then(|frame| one_image(self.args, self.targets, &finder, frame));
+                let failed = again.as_ref().err();
+                failed.iter().for_each(|error| bar.suspend(|| self.report.fail_again(error)));
+                if let Some(tables) = &tables {
+                    let mut again = again.map(|found| Outcome::Seen(Box::new(found)));
+                    tables.add(seen[index].index, row_of(name, &mut again));
+                }
+                bar.inc(1);
+            });
+            bar.finish_and_clear();
+        }
+        log!("ink: {ink} ({})", counted(ink.images as usize, "image"));
+        Ok(tables)
+    }
+
+    /// Calls a function with each frame and its index in parallel, until the run is interrupted.
+    fn for_each(
+        &self,
+        frames: impl Iterator<Item = anyhow::Result<Frame>> + Send,
+        work: impl Fn(usize, anyhow::Result<Frame>) + Sync,
+    ) {
+        images_at_once::for_each(
+            &self.threads,
+            &self.args.finder.limits(),
+            frames,
+            |index, frame| {
+                if !interrupt::is_raised() {
+                    work(index, frame);
+                }
+            },
+        );
+    }
 }
 
 /// Notes that each image used its own ink estimate, and that the joint estimate gives different corners.
@@ -269,165 +327,6 @@ fn note_ink_of_all(detector: &Detector, seen: &[Seen]) {
             "note: --stream used a separate ink estimate for each image; without it, corners are located with the \
              joint estimate, {ink} ({images}), and differ slightly"
         );
-    }
-}
-
-/// Processes all images a second time with the joint ink estimate, because a single image may constrain the ink
-/// poorly. Rewrites the tables, with the rows of images that were not processed.
-#[expect(clippy::too_many_arguments, reason = "the state of the first pass")]
-fn see_again(
-    args: &Args,
-    targets: &[Target],
-    detector: &Detector,
-    seen: &[Seen],
-    frames: impl Iterator<Item = anyhow::Result<Frame>> + Send,
-    unseen: Vec<(usize, Option<ImageRecord>)>,
-    threads: &rayon::ThreadPool,
-    report: &Report,
-) -> anyhow::Result<Option<Tables>> {
-    let found: Vec<Option<InkEstimate>> = seen.iter().map(|seen| seen.ink).collect();
-    let known: Vec<InkEstimate> = found.iter().copied().flatten().collect();
-    let Some(ink) = InkEstimate::of_all(&known).filter(|ink| ink.used) else { return Ok(None) };
-    let mut tables = None;
-    if let Some(detector) = detector.with_ink_of(&found) {
-        let finder = ImageDetector::of(args, detector);
-        let bar = progress::bar(seen.len() as u64, "images, second pass with joint ink estimate");
-        let mut wanted = seen.iter().map(|seen| seen.index).peekable();
-        let frames = frames.enumerate().filter(|(index, _)| wanted.next_if_eq(index).is_some());
-        tables = args.tables().map(|folder| Tables::begin(folder, targets)).transpose()?;
-        if let Some(table) = &tables {
-            unseen.iter().for_each(|(index, row)| table.add(*index, row.clone()));
-        }
-        let frames = frames.map(|(_, frame)| frame);
-        images_at_once::for_each(threads, &args.finder.limits(), frames, |index, frame| {
-            if interrupt::is_raised() {
-                return;
-            }
-            let index = seen[index].index;
-            let name = frame.as_ref().ok().map(Frame::name);
-            let again = frame.and_then(|frame| one_image(args, targets, &finder, frame));
-            again.as_ref().err().iter().for_each(|error| bar.suspend(|| report.fail_again(error)));
-            if let Some(tables) = &tables {
-                let mut again = again.map(|found| Outcome::Seen(Box::new(found)));
-                tables.add(index, row_of(name, &mut again));
-            }
-            bar.inc(1);
-        });
-        bar.finish_and_clear();
-    }
-    log!("ink: {ink} ({})", counted(ink.images as usize, "image"));
-    Ok(tables)
-}
-
-/// Returns the table row of an image, if it has one.
-fn row_of(name: Option<String>, result: &mut anyhow::Result<Outcome>) -> Option<ImageRecord> {
-    match result {
-        Ok(Outcome::Seen(found)) => found.row.take(),
-        Ok(Outcome::Skipped) => None,
-        Err(error) => Some(ImageRecord::unread(name?, run::message(error))),
-    }
-}
-
-/// Prints the results of the images in order, as soon as they are available.
-struct Report {
-    /// Whether images that show the target are not reported.
-    is_silent: bool,
-    /// With a single image, its error is the error of the command.
-    single: bool,
-    /// How to resume after an interruption.
-    go_on: &'static str,
-    state: Mutex<State>,
-}
-
-#[derive(Default)]
-struct State {
-    next: usize,
-    waiting: BTreeMap<usize, anyhow::Result<Outcome>>,
-    failed: usize,
-    skipped: usize,
-    found: usize,
-    error: Option<anyhow::Error>,
-}
-
-impl Report {
-    fn new(single: bool, is_silent: bool, go_on: &'static str) -> Self {
-        let report = Self { single, is_silent, go_on, state: Mutex::default() };
-        interrupt::set_status(report.status());
-        report
-    }
-
-    /// Describes the progress so far.
-    fn status(&self) -> String {
-        format!("{} done{}", counted(self.done(), "image"), self.go_on)
-    }
-
-    fn add(&self, index: usize, result: anyhow::Result<Outcome>) {
-        self.print(index, result);
-        interrupt::set_status(self.status());
-    }
-
-    fn print(&self, index: usize, result: anyhow::Result<Outcome>) {
-        let mut state = self.state.lock().expect("no thread panics here");
-        state.waiting.insert(index, result);
-        loop {
-            let next = state.next;
-            let Some(result) = state.waiting.remove(&next) else { return };
-            state.next += 1;
-            match result {
-                Ok(Outcome::Skipped) => state.skipped += 1,
-                Ok(Outcome::Seen(found)) => {
-                    state.found += usize::from(found.is_there);
-                    // Output that cannot be printed is lost, as with `println`.
-                    if self.is_silent && found.is_there {
-                        continue;
-                    }
-                    if let Err(error) = output::print(&found.line) {
-                        state.error.get_or_insert(error);
-                    }
-                }
-                Err(error) => {
-                    state.failed += 1;
-                    if self.single {
-                        state.error = Some(error);
-                    } else {
-                        run::report(&error);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Counts an image that failed in the second pass.
-    fn fail_again(&self, error: &anyhow::Error) {
-        run::report(error);
-        self.state.lock().expect("no thread panics here").failed += 1;
-    }
-
-    fn done(&self) -> usize {
-        let state = self.state.lock().expect("no thread panics here");
-        state.next + state.waiting.len()
-    }
-
-    fn end(self) -> anyhow::Result<ExitCode> {
-        let State { next: all, failed, skipped, found, error, .. } =
-            self.state.into_inner().expect("no thread panics here");
-        if let Some(error) = error {
-            return Err(error);
-        }
-        if skipped > 0 {
-            log!(
-                "{skipped} of {} skipped, because they already have results",
-                counted(all, "image")
-            );
-        }
-        if failed == 0 {
-            let nothing = found == 0 && skipped == 0;
-            return Ok(if nothing { ExitCode::from(FAILED) } else { ExitCode::SUCCESS });
-        }
-        if all > 1 {
-            log!("error: {failed} of {all} images failed");
-        }
-        Ok(ExitCode::from(if failed == all { BAD_INPUT } else { FAILED }))
     }
 }
 
@@ -482,6 +381,21 @@ impl Args {
     /// Returns the folder of tables, if requested.
     fn tables(&self) -> Option<&Path> {
         self.folder().filter(|_| !self.format.iter().all(|format| format.is_of_one_image()))
+    }
+
+    /// Starts tables, if requested.
+    fn begin_tables(&self, targets: &[Target]) -> anyhow::Result<Option<Tables>> {
+        self.tables().map(|folder| Tables::begin(folder, targets)).transpose()
+    }
+
+    /// Returns the rows of existing tables if they are to be completed. Refuses to replace files that are not tables.
+    fn earlier(&self) -> anyhow::Result<Vec<ImageRecord>> {
+        let Some(folder) = self.tables() else { return Ok(Vec::new()) };
+        detection_tables::check(folder, self.overwrite)?;
+        match self.skip_existing {
+            true => detection_tables::earlier(folder, &self.finder.limits()),
+            false => Ok(Vec::new()),
+        }
     }
 
     /// Iterates over the requested formats with one file per image.
