@@ -405,151 +405,133 @@ pub(in crate::export) fn diagnoses<'a>(
     print_scale: Option<[f64; 2]>,
 ) -> Vec<DiagnosisRecord<'a>> {
     let words = Messages::new(estimate, print_scale);
-    let name = |camera: usize| estimate.camera_name(camera);
     let record = |diagnosis: &'a Diagnosis| {
-        let text =
-            DiagnosisRecord { text: words.sentence(diagnosis), ..DiagnosisRecord::default() };
+        let record = DiagnosisRecord::of(diagnosis, estimate)?;
+        Some(DiagnosisRecord { text: words.sentence(diagnosis), ..record })
+    };
+    diagnoses.iter().filter_map(record).collect()
+}
+
+impl<'a> DiagnosisRecord<'a> {
+    /// The record without its sentence; `None` for findings.
+    fn of(diagnosis: &'a Diagnosis, estimate: &'a Estimate) -> Option<Self> {
+        let of_camera = |kind, camera: &usize| Self::of_camera(kind, *camera, estimate);
+        let misfit =
+            |kind, camera, rms_px: &f64| Self { rms_px: Some(*rms_px), ..of_camera(kind, camera) };
+        let many = |kind, excluded: &usize, all: &usize| Self {
+            excluded: Some(*excluded),
+            all: Some(*all),
+            ..Self::new(kind)
+        };
         Some(match diagnosis {
-            Diagnosis::WrongCamera { camera, rms_px } => DiagnosisRecord {
-                kind: "wrong_camera",
-                camera: name(*camera),
-                rms_px: Some(*rms_px),
-                ..text
-            },
-            Diagnosis::UnusableFit { camera, rms_px } => DiagnosisRecord {
-                kind: "unusable_fit",
-                camera: name(*camera),
-                rms_px: Some(*rms_px),
-                ..text
-            },
-            Diagnosis::ManyExcluded { excluded, all } => DiagnosisRecord {
-                kind: "many_excluded",
-                excluded: Some(*excluded),
-                all: Some(*all),
-                ..text
-            },
-            Diagnosis::ManyPanelsExcluded { excluded, all } => DiagnosisRecord {
-                kind: "many_panels_excluded",
-                excluded: Some(*excluded),
-                all: Some(*all),
-                ..text
-            },
-            Diagnosis::DelayedCamera { camera, frames } => DiagnosisRecord {
-                kind: "delayed_camera",
-                camera: name(*camera),
-                frames: Some(*frames),
-                ..text
-            },
-            Diagnosis::LabelsRotated { camera, rotation } => DiagnosisRecord {
-                kind: "labels_rotated",
-                camera: name(*camera),
+            Diagnosis::WrongCamera { camera, rms_px } => misfit("wrong_camera", camera, rms_px),
+            Diagnosis::UnusableFit { camera, rms_px } => misfit("unusable_fit", camera, rms_px),
+            Diagnosis::ManyExcluded { excluded, all } => many("many_excluded", excluded, all),
+            Diagnosis::ManyPanelsExcluded { excluded, all } => {
+                many("many_panels_excluded", excluded, all)
+            }
+            Diagnosis::DelayedCamera { camera, frames } => {
+                Self { frames: Some(*frames), ..of_camera("delayed_camera", camera) }
+            }
+            Diagnosis::LabelsRotated { camera, rotation } => Self {
                 degrees: Some(rotation.degrees),
                 frames: Some(rotation.frames as i32),
                 all: Some(rotation.of),
                 confirmed: Some(rotation.is_confirmed),
-                ..text
+                ..of_camera("labels_rotated", camera)
             },
             Diagnosis::AmbiguousLabels { degrees } => {
-                DiagnosisRecord { kind: "ambiguous_labels", degrees: Some(*degrees), ..text }
+                Self { degrees: Some(*degrees), ..Self::new("ambiguous_labels") }
             }
-            Diagnosis::SecondMinimum { camera, other, rms_px } => DiagnosisRecord {
-                kind: "second_minimum",
-                camera: name(*camera),
+            Diagnosis::SecondMinimum { camera, other, rms_px } => Self {
                 rms_px_then: Some(*rms_px),
                 other: other.parameter_names().into_iter().zip(other.parameters()).collect(),
-                ..text
+                ..of_camera("second_minimum", camera)
             },
-            Diagnosis::ChangedCamera { camera, change } => DiagnosisRecord {
-                kind: "changed_camera",
-                camera: name(*camera),
+            Diagnosis::NonMonotonicLens { camera, end: LensLimit { monotonic_px, .. } } => Self {
+                monotonic_px: Some(*monotonic_px),
+                ..of_camera("non_monotonic_lens", camera)
+            },
+            Diagnosis::Remedied { camera, remedy } => Self {
+                rms_px: Some(remedy.from_px),
+                rms_px_then: Some(remedy.to_px),
+                views: Some(remedy.excluded_views).filter(|views| *views > 0),
+                alternative: Some(alternative(remedy.alternative)?),
+                ..of_camera("remedy", camera)
+            },
+            Diagnosis::LackOfFit(LackOfFit::Lens { camera, rms_px }) => {
+                misfit("pattern_over_image", camera, rms_px)
+            }
+            Diagnosis::LackOfFit(LackOfFit::Target { panel, rms_px, rms_mm }) => Self {
+                panel: Some(*panel),
+                rms_px: Some(*rms_px),
+                rms_mm: Some(*rms_mm),
+                ..Self::new("pattern_over_target")
+            },
+            Diagnosis::PoorFit { camera, rms_px } => misfit("poor_fit", camera, rms_px),
+            Diagnosis::WrongConstraint { camera, constraint, deviations } => Self {
+                parameters: constraint.parameters(),
+                deviations: Some(*deviations),
+                ..of_camera("wrong_constraint", camera)
+            },
+            Diagnosis::IllConditioned { camera, parameters, sufficient } => Self {
+                parameters,
+                sufficient: sufficient.map(|model| model.to_string()),
+                ..of_camera("ill_conditioned", camera)
+            },
+            _ => return Self::of_state(diagnosis, estimate),
+        })
+    }
+
+    /// The record of a camera or a board that differs between views, rows or directions.
+    fn of_state(diagnosis: &'a Diagnosis, estimate: &'a Estimate) -> Option<Self> {
+        let of_camera = |kind, camera: &usize, left_px, significance| Self {
+            rms_px_then: Some(left_px),
+            significance: Some(significance),
+            ..Self::of_camera(kind, *camera, estimate)
+        };
+        Some(match diagnosis {
+            Diagnosis::ChangedCamera { camera, change } => Self {
                 from_view: Some(&change.from_view),
                 focal_px: change.of(ChangedIntrinsic::Focal),
                 cx_px: change.of(ChangedIntrinsic::CentreX),
                 cy_px: change.of(ChangedIntrinsic::CentreY),
                 sd_px: Some(change.sd_px),
-                rms_px_then: Some(change.left_px),
-                significance: Some(change.significance),
-                ..text
+                ..of_camera("changed_camera", camera, change.left_px, change.significance)
             },
-            Diagnosis::RollingShutter { camera, shutter } => DiagnosisRecord {
-                kind: "rolling_shutter",
-                camera: name(*camera),
+            Diagnosis::RollingShutter { camera, shutter } => Self {
                 shear_px: Some(shutter.shear_px),
                 views: Some(shutter.views),
-                rms_px_then: Some(shutter.left_px),
-                significance: Some(shutter.significance),
-                ..text
+                ..of_camera("rolling_shutter", camera, shutter.left_px, shutter.significance)
             },
-            Diagnosis::StretchedBoard { camera, stretch } => DiagnosisRecord {
-                kind: "stretched_board",
-                camera: name(*camera),
+            Diagnosis::StretchedBoard { camera, stretch } => Self {
                 ratio: Some(stretch.ratio),
                 ratio_sd: Some(stretch.sd),
-                rms_px_then: Some(stretch.left_px),
-                significance: Some(stretch.significance),
-                ..text
-            },
-            Diagnosis::NonMonotonicLens { camera, end: LensLimit { monotonic_px, .. } } => {
-                DiagnosisRecord {
-                    kind: "non_monotonic_lens",
-                    camera: name(*camera),
-                    monotonic_px: Some(*monotonic_px),
-                    ..text
-                }
-            }
-            Diagnosis::Remedied { camera, remedy } => DiagnosisRecord {
-                kind: "remedy",
-                camera: name(*camera),
-                rms_px: Some(remedy.from_px),
-                rms_px_then: Some(remedy.to_px),
-                views: Some(remedy.excluded_views).filter(|views| *views > 0),
-                alternative: Some(match remedy.alternative {
-                    Alternative::Model(model) => model.to_string(),
-                    Alternative::Shape => "board_shape".to_owned(),
-                    Alternative::Panels => "panels".to_owned(),
-                    Alternative::Camera => "camera".to_owned(),
-                    Alternative::Constraints => "constraints".to_owned(),
-                    _ => return None,
-                }),
-                ..text
-            },
-            Diagnosis::LackOfFit(LackOfFit::Lens { camera, rms_px }) => DiagnosisRecord {
-                kind: "pattern_over_image",
-                camera: name(*camera),
-                rms_px: Some(*rms_px),
-                ..text
-            },
-            Diagnosis::LackOfFit(LackOfFit::Target { panel, rms_px, rms_mm }) => DiagnosisRecord {
-                kind: "pattern_over_target",
-                panel: Some(*panel),
-                rms_px: Some(*rms_px),
-                rms_mm: Some(*rms_mm),
-                ..text
-            },
-            Diagnosis::PoorFit { camera, rms_px } => DiagnosisRecord {
-                kind: "poor_fit",
-                camera: name(*camera),
-                rms_px: Some(*rms_px),
-                ..text
-            },
-            Diagnosis::WrongConstraint { camera, constraint, deviations } => DiagnosisRecord {
-                kind: "wrong_constraint",
-                camera: name(*camera),
-                parameters: constraint.parameters(),
-                deviations: Some(*deviations),
-                ..text
-            },
-            Diagnosis::IllConditioned { camera, parameters, sufficient } => DiagnosisRecord {
-                kind: "ill_conditioned",
-                camera: name(*camera),
-                parameters,
-                sufficient: sufficient.map(|model| model.to_string()),
-                ..text
+                ..of_camera("stretched_board", camera, stretch.left_px, stretch.significance)
             },
             _ => return None,
         })
-    };
-    diagnoses.iter().filter_map(record).collect()
+    }
+
+    fn of_camera(kind: &'static str, camera: usize, estimate: &'a Estimate) -> Self {
+        Self { camera: estimate.camera_name(camera), ..Self::new(kind) }
+    }
+
+    fn new(kind: &'static str) -> Self {
+        Self { kind, ..Self::default() }
+    }
+}
+
+/// The name of an alternative in files.
+fn alternative(tried: Alternative) -> Option<String> {
+    Some(match tried {
+        Alternative::Model(model) => model.to_string(),
+        Alternative::Shape => "board_shape".to_owned(),
+        Alternative::Panels => "panels".to_owned(),
+        Alternative::Camera => "camera".to_owned(),
+        Alternative::Constraints => "constraints".to_owned(),
+        _ => return None,
+    })
 }
 
 #[cfg(test)]
