@@ -204,15 +204,24 @@ impl Verdict {
 
     /// Writes the numbers of corners and tags on the surfaces.
     fn corners_and_tags(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let sum = |count: fn(&SheetVerdict) -> usize| self.sheets.iter().map(count).sum::<usize>();
+        write!(f, ", {}", self.corners())?;
+        write_tags(f, self.sheets.iter().map(|s| s.tags_exact).sum())
+    }
+
+    /// Describes the corners or circles on the surfaces.
+    fn corners(&self) -> String {
         let deviation = self.sheets.iter().map(|s| s.max_deviation_mm).fold(0.0, f64::max);
         let what = if self.sheets.iter().all(|s| s.has_discs) { "circle" } else { "corner" };
-        let corners = counted(sum(|s| s.corners_found), what);
-        write!(f, ", {corners} within {deviation:.4} mm")?;
-        match sum(|s| s.tags_exact) {
-            0 => Ok(()),
-            tags => write!(f, ", {} exact", counted(tags, "tag")),
-        }
+        let corners = counted(self.sheets.iter().map(|s| s.corners_found).sum(), what);
+        format!("{corners} within {deviation:.4} mm")
+    }
+}
+
+/// Writes the number of exact tags, if there are any.
+fn write_tags(f: &mut fmt::Formatter<'_>, tags: usize) -> fmt::Result {
+    match tags {
+        0 => Ok(()),
+        _ => write!(f, ", {} exact", counted(tags, "tag")),
     }
 }
 
@@ -254,80 +263,85 @@ impl fmt::Display for Verdict {
     /// Writes one line that lists the verified items or the findings.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: ", self.artifact)?;
-        if let Some(list) = self.list.as_ref().filter(|_| self.passed) {
+        if !self.passed {
+            return self.failure(f);
+        }
+        if let Some(list) = &self.list {
             return write!(f, "{list}");
         }
-        if let Some(cut) = self.cut.as_ref().filter(|_| self.passed) {
+        if let Some(cut) = &self.cut {
             write!(f, "{cut}")?;
             return if self.sheets.is_empty() { Ok(()) } else { self.corners_and_tags(f) };
         }
-        if let Some(body) = self.body.as_ref().filter(|_| self.passed) {
-            let BodyVerdict { triangles, volume_mm3, seats, max_deviation_mm } = body;
-            write!(f, "verified, closed body of {}, ", counted(*triangles, "triangle"))?;
-            write!(f, "{:.1} cm³, ", volume_mm3 / 1e3)?;
-            return match seats {
-                0 => write!(f, "vertices within {max_deviation_mm:.4} mm"),
-                _ => write!(f, "{} within {max_deviation_mm:.4} mm", counted(*seats, "seat")),
-            };
+        if let Some(body) = &self.body {
+            return body.describe(f);
         }
-        if let Some(inlay) = self.inlay.as_ref().filter(|_| self.passed) {
+        if let Some(inlay) = &self.inlay {
             write!(f, "{inlay}")?;
             return self.corners_and_tags(f);
         }
-        if self.passed && !self.faces.is_empty() {
-            let sum =
-                |count: fn(&FaceVerdict) -> usize| self.faces.iter().map(count).sum::<usize>();
-            let deviation = self.faces.iter().map(|s| s.max_deviation_mm).fold(0.0, f64::max);
-            let corners = counted(sum(|s| s.corners_found), "corner");
-            let tags = match sum(|s| s.tags_exact) {
-                0 => String::new(),
-                tags => format!(", {} exact", counted(tags, "tag")),
-            };
-            let faces = counted(self.faces.len(), "face");
-            return write!(
-                f,
-                "verified, {faces}, {corners} in space within {deviation:.4} mm{tags}"
-            );
+        if self.faces.is_empty() { self.pages(f) } else { self.in_space(f) }
+    }
+}
+
+impl BodyVerdict {
+    fn describe(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { triangles, volume_mm3, seats, max_deviation_mm } = self;
+        write!(f, "verified, closed body of {}, ", counted(*triangles, "triangle"))?;
+        write!(f, "{:.1} cm³, ", volume_mm3 / 1e3)?;
+        match seats {
+            0 => write!(f, "vertices within {max_deviation_mm:.4} mm"),
+            _ => write!(f, "{} within {max_deviation_mm:.4} mm", counted(*seats, "seat")),
         }
-        if self.passed {
-            let sum =
-                |count: fn(&SheetVerdict) -> usize| self.sheets.iter().map(count).sum::<usize>();
-            let deviation = self.sheets.iter().map(|s| s.max_deviation_mm).fold(0.0, f64::max);
-            write!(f, "verified, ")?;
-            let pages = sum(|s| s.pages);
-            if pages > 1 {
-                write!(f, "{pages} pages, ")?;
-            }
-            let corners = sum(|s| s.corners_found);
-            // A sheet of single tags has no corners.
-            if corners > 0 {
-                let what =
-                    if self.sheets.iter().all(|s| s.has_discs) { "circle" } else { "corner" };
-                write!(f, "{} within {deviation:.4} mm, ", counted(corners, what))?;
-            }
-            let folds: Vec<&FoldVerdict> =
-                self.sheets.iter().filter_map(|s| s.fold.as_ref()).collect();
-            if !folds.is_empty() {
-                let off = folds.iter().map(|fold| fold.max_deviation_mm).fold(0.0, f64::max);
-                let edges: usize = folds.iter().map(|fold| fold.edges).sum();
-                write!(f, "folds into the solid within {off:.4} mm, ")?;
-                write!(f, "{} matched, ", counted(edges, "edge"))?;
-            }
-            let tags = sum(|s| s.tags_exact);
-            if tags > 0 {
-                write!(f, "{} exact, ", counted(tags, "tag"))?;
-            }
-            let bars = self.sheets.iter().flat_map(|s| &s.check_bars_mm);
-            let bars: Vec<String> =
-                bars.filter_map(|(_, found)| Some(format!("{:.2}", (*found)?))).collect();
-            return match bars.as_slice() {
-                [] => write!(f, "page size exact"),
-                bars if bars.len() > NAMED => {
-                    write!(f, "{} check bars, page size exact", bars.len())
-                }
-                bars => write!(f, "check bars {} mm, page size exact", bars.join(" and ")),
-            };
+    }
+}
+
+impl Verdict {
+    /// Writes what was verified on the faces of a mesh.
+    fn in_space(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let sum = |count: fn(&FaceVerdict) -> usize| self.faces.iter().map(count).sum::<usize>();
+        let deviation = self.faces.iter().map(|s| s.max_deviation_mm).fold(0.0, f64::max);
+        let corners = counted(sum(|s| s.corners_found), "corner");
+        let faces = counted(self.faces.len(), "face");
+        write!(f, "verified, {faces}, {corners} in space within {deviation:.4} mm")?;
+        write_tags(f, sum(|s| s.tags_exact))
+    }
+
+    /// Writes what was verified on pages.
+    fn pages(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let sum = |count: fn(&SheetVerdict) -> usize| self.sheets.iter().map(count).sum::<usize>();
+        write!(f, "verified, ")?;
+        let pages = sum(|s| s.pages);
+        if pages > 1 {
+            write!(f, "{pages} pages, ")?;
         }
+        // A sheet of single tags has no corners.
+        if sum(|s| s.corners_found) > 0 {
+            write!(f, "{}, ", self.corners())?;
+        }
+        let folds: Vec<&FoldVerdict> = self.sheets.iter().filter_map(|s| s.fold.as_ref()).collect();
+        if !folds.is_empty() {
+            let off = folds.iter().map(|fold| fold.max_deviation_mm).fold(0.0, f64::max);
+            let edges: usize = folds.iter().map(|fold| fold.edges).sum();
+            write!(f, "folds into the solid within {off:.4} mm, ")?;
+            write!(f, "{} matched, ", counted(edges, "edge"))?;
+        }
+        let tags = sum(|s| s.tags_exact);
+        if tags > 0 {
+            write!(f, "{} exact, ", counted(tags, "tag"))?;
+        }
+        let bars = self.sheets.iter().flat_map(|s| &s.check_bars_mm);
+        let bars: Vec<String> =
+            bars.filter_map(|(_, found)| Some(format!("{:.2}", (*found)?))).collect();
+        match bars.as_slice() {
+            [] => write!(f, "page size exact"),
+            bars if bars.len() > NAMED => write!(f, "{} check bars, page size exact", bars.len()),
+            bars => write!(f, "check bars {} mm, page size exact", bars.join(" and ")),
+        }
+    }
+
+    /// Writes the findings.
+    fn failure(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let everywhere = self.findings.iter().map(ToString::to_string);
         let on_sheets = self.sheets.iter().flat_map(|sheet| {
             let page = if self.sheets.len() > 1 {

@@ -154,40 +154,41 @@ impl Reason {
 impl fmt::Display for Reason {
     /// Writes a sentence without its full stop.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let figure = |name| self.figure(name);
-        let count = |name, thing| counted(figure(name) as usize, thing);
-        if let Some(settings) = &self.fits {
-            return write!(
+        match &self.fits {
+            Some(settings) => write!(
                 f,
                 "the tags fit a board with {settings}; it is another board, or the target file is wrong"
-            );
+            ),
+            None => f.write_str(&self.sentence()),
         }
+    }
+}
+
+impl Reason {
+    /// The sentence of the kind of reason, with its figures.
+    fn sentence(&self) -> String {
+        let figure = |name| self.figure(name);
+        let count = |name, thing| counted(figure(name) as usize, thing);
+        let (corners, tiles) = (count("corners", "corner"), count("tiles", "tile"));
+        let (tags, expected) = (count("tags", "tag"), figure("expected"));
         match self.kind {
-            ReasonKind::NoCorners => write!(f, "no corners found in the image"),
-            ReasonKind::TooDark => write!(
-                f,
+            ReasonKind::NoCorners => "no corners found in the image".to_owned(),
+            ReasonKind::TooDark => format!(
                 "too dark: the brightest pixels are at {:.1} % of full scale; use a longer exposure",
                 100.0 * figure("brightest")
             ),
-            ReasonKind::Overexposed => write!(
-                f,
+            ReasonKind::Overexposed => format!(
                 "overexposed: {:.0} % of the image is saturated; use a shorter exposure",
                 100.0 * figure("saturated")
             ),
-            ReasonKind::TooBlurred => write!(
-                f,
+            ReasonKind::TooBlurred => format!(
                 "too blurred: the sharpest edges are {:.1} px wide; focus, or hold the camera still",
                 figure("blur_px")
             ),
-            ReasonKind::NoGrid => {
-                write!(
-                    f,
-                    "found {}, but no grid: the target is covered, too small, blurred by motion, or not in the image",
-                    count("corners", "corner")
-                )
-            }
-            ReasonKind::TooSmall => write!(
-                f,
+            ReasonKind::NoGrid => format!(
+                "found {corners}, but no grid: the target is covered, too small, blurred by motion, or not in the image"
+            ),
+            ReasonKind::TooSmall => format!(
                 "tiles are too small ({:.1} px); move closer until their edges are {:.0} px long",
                 figure("edge_px"),
                 figure("needed_edge_px")
@@ -198,95 +199,62 @@ impl fmt::Display for Reason {
                     3.0 => ["triangles", "squares"],
                     _ => ["squares", "triangles"],
                 };
-                let corners = count("corners", "corner");
-                write!(
-                    f,
+                format!(
                     "found {corners} of {found} where {expected} are expected: check the kind of the target"
                 )
             }
-            ReasonKind::UnreadableTags if !self.figures.contains_key("needed_bit_px") => write!(
-                f,
-                "tag cells are {:.1} px wide with a blur of {:.1} px, and their contrast is too \
-                 low for the noise; use more light or contrast",
-                figure("bit_px"),
-                figure("blur_px")
+            ReasonKind::UnreadableTags => self.unreadable_tags(),
+            ReasonKind::NoTiles => format!(
+                "found {corners}, but no complete tile that could carry a tag; show more of the board"
             ),
-            ReasonKind::UnreadableTags => write!(
-                f,
-                "tag cells are {:.1} px wide with a blur of {:.1} px; reading them needs {:.1} px: \
-                 move closer or focus better",
-                figure("bit_px"),
-                figure("blur_px"),
-                figure("needed_bit_px")
-            ),
-            ReasonKind::NoTiles => {
-                write!(
-                    f,
-                    "found {}, but no complete tile that could carry a tag; show more of the board",
-                    count("corners", "corner")
-                )
-            }
-            ReasonKind::NoTags => {
-                write!(f, "no tag found in {} that could carry one", count("tiles", "tile"))
-            }
-            ReasonKind::OtherIds => write!(
-                f,
-                "{} not on the target, for example id {}; is this another target?",
-                count("tags", "tag"),
+            ReasonKind::NoTags => format!("no tag found in {tiles} that could carry one"),
+            ReasonKind::OtherIds => format!(
+                "{tags} not on the target, for example id {}; is this another target?",
                 figure("id")
             ),
-            ReasonKind::OtherLayout => write!(
-                f,
+            ReasonKind::OtherLayout => format!(
                 "tags fit the target, but {} of {} surrounding tiles contradict it; is this another target?",
                 figure("disagreeing"),
                 figure("agreeing") + figure("disagreeing")
             ),
-            ReasonKind::OtherFamily => write!(
-                f,
-                "none of {} decoded reliably shows a tag of the target's family; is the family correct?",
-                count("tiles", "tile")
+            ReasonKind::OtherFamily => format!(
+                "none of {tiles} decoded reliably shows a tag of the target's family; is the family correct?"
             ),
-            ReasonKind::Mirrored => write!(
-                f,
-                "a grid of {} is mirrored; flip the image, or allow mirrored labels",
-                count("corners", "corner")
-            ),
-            ReasonKind::Ambiguous => {
-                write!(
-                    f,
-                    "a grid of {} fits the target in more than one position",
-                    count("corners", "corner")
-                )
+            ReasonKind::Mirrored => {
+                format!("a grid of {corners} is mirrored; flip the image, or allow mirrored labels")
             }
-            ReasonKind::NotWhole if figure("corners") == figure("expected") => write!(
-                f,
-                "a grid of {} has different numbers of rows and columns than the board; are they swapped?",
-                count("corners", "corner")
+            ReasonKind::Ambiguous => {
+                format!("a grid of {corners} fits the target in more than one position")
+            }
+            ReasonKind::NotWhole if figure("corners") == expected => format!(
+                "a grid of {corners} has different numbers of rows and columns than the board; are they swapped?"
             ),
-            ReasonKind::NotWhole => write!(
-                f,
-                "a grid of {} is not the complete board of {}",
-                count("corners", "corner"),
-                figure("expected")
-            ),
-            ReasonKind::TooManyCorners => write!(
-                f,
-                "a grid of {} is larger than any board; boards have at most {}",
-                count("corners", "corner"),
-                figure("expected")
+            ReasonKind::NotWhole => {
+                format!("a grid of {corners} is not the complete board of {expected}")
+            }
+            ReasonKind::TooManyCorners => format!(
+                "a grid of {corners} is larger than any board; boards have at most {expected}"
             ),
             ReasonKind::CutByBorder => {
-                write!(f, "a grid of {} is cut off by the image border", count("corners", "corner"))
+                format!("a grid of {corners} is cut off by the image border")
             }
-            ReasonKind::SeenTwice => write!(
-                f,
-                "{} excluded, because the same panel appears elsewhere in the image; is there a second copy of the target?",
-                count("corners", "corner")
+            ReasonKind::SeenTwice => format!(
+                "{corners} excluded, because the same panel appears elsewhere in the image; is there a second copy of the target?"
             ),
             ReasonKind::TooManyGrids => {
-                write!(f, "the image contains too many grids or corners to process")
+                "the image contains too many grids or corners to process".to_owned()
             }
         }
+    }
+
+    fn unreadable_tags(&self) -> String {
+        let [bit_px, blur_px] = ["bit_px", "blur_px"].map(|name| self.figure(name));
+        let advice = match self.figures.get("needed_bit_px") {
+            Some(px) => format!("; reading them needs {px:.1} px: move closer or focus better"),
+            None => ", and their contrast is too low for the noise; use more light or contrast"
+                .to_owned(),
+        };
+        format!("tag cells are {bit_px:.1} px wide with a blur of {blur_px:.1} px{advice}")
     }
 }
 

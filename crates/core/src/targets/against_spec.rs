@@ -4,6 +4,8 @@
 //! content printed on them, the finish, and the
 //! skeleton walls of a solid. The spacing of tags may differ if it gives the same tags.
 
+use std::fmt::Display;
+
 use super::error::{Problem, problem};
 use super::identity::fingerprint;
 use crate::family::shipped_name;
@@ -34,81 +36,92 @@ pub(super) fn check(target: &Target) -> Result<(), Problem> {
     check_families(target)?;
     // Panels that were fixed at their planned pose have no covariance, although refined ones have.
     let is_refined = target.panels.iter().any(|panel| panel.pose.covariance.is_some());
-    let differs = |field: String, found: &dyn std::fmt::Display, made: &dyn std::fmt::Display| {
-        problem(field, format!("it is {found}, but `spec` gives {made}"))
-    };
-    let near = |a: Option<f64>, b: Option<f64>| match (a, b) {
-        (Some(a), Some(b)) => (a - b).abs() <= SPEC_SLACK_MM,
-        (a, b) => a == b,
-    };
     if target.panels.len() != made.len() {
         return differs("panels.length".to_owned(), &target.panels.len(), &made.len());
     }
     if target.family.is_some() != tagged {
         return problem("family", "it must be present if, and only if, `spec.tags` is");
     }
-    for (p, (panel, made)) in target.panels.iter().zip(&made).enumerate() {
-        let field = |key: &str| format!("panels[{p}].{key}");
-        if panel.id != made.id {
-            return differs(field("id"), &panel.id, &made.id);
+    let mut panels = target.panels.iter().zip(&made).enumerate();
+    panels.try_for_each(|(p, (panel, made))| {
+        check_panel(&format!("panels[{p}]"), panel, made, is_refined)
+    })
+}
+
+/// Returns the error of a field whose value the spec does not give.
+fn differs(field: String, found: &dyn Display, made: &dyn Display) -> Result<(), Problem> {
+    problem(field, format!("it is {found}, but `spec` gives {made}"))
+}
+
+/// Compares a panel, called `name`, with that of the spec.
+fn check_panel(name: &str, panel: &Panel, made: &Panel, is_refined: bool) -> Result<(), Problem> {
+    let field = |key: &str| format!("{name}.{key}");
+    let near = |a: Option<f64>, b: Option<f64>| match (a, b) {
+        (Some(a), Some(b)) => (a - b).abs() <= SPEC_SLACK_MM,
+        (a, b) => a == b,
+    };
+    if panel.id != made.id {
+        return differs(field("id"), &panel.id, &made.id);
+    }
+    if (panel.edge_mm - made.edge_mm).abs() > SPEC_SLACK_MM {
+        return differs(field("edge_mm"), &panel.edge_mm, &made.edge_mm);
+    }
+    let plain = [
+        ("kind", panel.kind == made.kind),
+        ("border_bits", panel.border_bits == made.border_bits),
+        ("tags_in", panel.tags_in == made.tags_in),
+        ("gap_edges", near(panel.gap_edges, made.gap_edges)),
+        ("discs_mm", near(panel.discs_mm, made.discs_mm)),
+        ("hole_mm", near(panel.hole_mm, made.hole_mm)),
+        ("tag_margin_bits", near(panel.tag_margin_bits, made.tag_margin_bits)),
+        ("inverted", panel.inverted == made.inverted),
+        ("rim_mm", near(panel.rim_mm, made.rim_mm)),
+        ("outline", panel.outline == made.outline),
+        ("matrix", panel.matrix == made.matrix),
+    ];
+    if let Some((key, _)) = plain.iter().find(|(_, same)| !same) {
+        return problem(field(key), "it does not match `spec`");
+    }
+    if !is_refined && !is_same_place(&panel.pose, &made.pose) {
+        let what = "it does not match `spec`, and no pose was measured (there is no `covariance`)";
+        return problem(field("pose"), what);
+    }
+    if panel.corners.len() != made.corners.len() {
+        return differs(field("corners.length"), &panel.corners.len(), &made.corners.len());
+    }
+    for (i, (corner, made)) in panel.corners.iter().zip(&made.corners).enumerate() {
+        let pose = is_refined.then_some(&panel.pose);
+        check_corner(&field(&format!("corners[{i}]")), corner, made, pose)?;
+    }
+    if panel.tags.len() != made.tags.len() {
+        return differs(field("tags.length"), &panel.tags.len(), &made.tags.len());
+    }
+    for (i, (tag, made)) in panel.tags.iter().zip(&made.tags).enumerate() {
+        if tag != made {
+            let place = |t: &TagPlacement| format!("tag {} at row {} col {}", t.id, t.row, t.col);
+            return differs(field(&format!("tags[{i}]")), &place(tag), &place(made));
         }
-        if (panel.edge_mm - made.edge_mm).abs() > SPEC_SLACK_MM {
-            return differs(field("edge_mm"), &panel.edge_mm, &made.edge_mm);
-        }
-        let plain = [
-            ("kind", panel.kind == made.kind),
-            ("border_bits", panel.border_bits == made.border_bits),
-            ("tags_in", panel.tags_in == made.tags_in),
-            ("gap_edges", near(panel.gap_edges, made.gap_edges)),
-            ("discs_mm", near(panel.discs_mm, made.discs_mm)),
-            ("hole_mm", near(panel.hole_mm, made.hole_mm)),
-            ("tag_margin_bits", near(panel.tag_margin_bits, made.tag_margin_bits)),
-            ("inverted", panel.inverted == made.inverted),
-            ("rim_mm", near(panel.rim_mm, made.rim_mm)),
-            ("outline", panel.outline == made.outline),
-            ("matrix", panel.matrix == made.matrix),
-        ];
-        if let Some((key, _)) = plain.iter().find(|(_, same)| !same) {
-            return problem(field(key), "it does not match `spec`");
-        }
-        if !is_refined && !is_same_place(&panel.pose, &made.pose) {
-            let what =
-                "it does not match `spec`, and no pose was measured (there is no `covariance`)";
-            return problem(field("pose"), what);
-        }
-        if panel.corners.len() != made.corners.len() {
-            let (found, made) = (panel.corners.len(), made.corners.len());
-            return differs(field("corners.length"), &found, &made);
-        }
-        for (i, (corner, made)) in panel.corners.iter().zip(&made.corners).enumerate() {
-            if (corner.id, corner.row, corner.col) != (made.id, made.row, made.col) {
-                let place = |c: &Corner| format!("corner {} at row {} col {}", c.id, c.row, c.col);
-                return differs(field(&format!("corners[{i}]")), &place(corner), &place(made));
-            }
-            if corner.panel_mm.distance(made.panel_mm) > PLACE_SLACK_MM {
-                let field = field(&format!("corners[{i}].panel_mm"));
-                return differs(field, &corner.panel_mm, &made.panel_mm);
-            }
-            let expected = if is_refined {
-                panel.pose.target_from_panel(corner.panel_mm)
-            } else {
-                made.target_mm
-            };
-            if corner.target_mm.distance(expected) > PLACE_SLACK_MM {
-                let field = field(&format!("corners[{i}].target_mm"));
-                return differs(field, &corner.target_mm, &expected);
-            }
-        }
-        if panel.tags.len() != made.tags.len() {
-            return differs(field("tags.length"), &panel.tags.len(), &made.tags.len());
-        }
-        for (i, (tag, made)) in panel.tags.iter().zip(&made.tags).enumerate() {
-            if tag != made {
-                let place =
-                    |t: &TagPlacement| format!("tag {} at row {} col {}", t.id, t.row, t.col);
-                return differs(field(&format!("tags[{i}]")), &place(tag), &place(made));
-            }
-        }
+    }
+    Ok(())
+}
+
+/// Compares a corner, called `name`, with that of the spec; `refined` is the pose of its panel if poses were measured.
+fn check_corner(
+    name: &str,
+    corner: &Corner,
+    made: &Corner,
+    refined: Option<&PanelPose>,
+) -> Result<(), Problem> {
+    if (corner.id, corner.row, corner.col) != (made.id, made.row, made.col) {
+        let place = |c: &Corner| format!("corner {} at row {} col {}", c.id, c.row, c.col);
+        return differs(name.to_owned(), &place(corner), &place(made));
+    }
+    if corner.panel_mm.distance(made.panel_mm) > PLACE_SLACK_MM {
+        return differs(format!("{name}.panel_mm"), &corner.panel_mm, &made.panel_mm);
+    }
+    let expected = refined.map_or(made.target_mm, |pose| pose.target_from_panel(corner.panel_mm));
+    if corner.target_mm.distance(expected) > PLACE_SLACK_MM {
+        return differs(format!("{name}.target_mm"), &corner.target_mm, &expected);
     }
     Ok(())
 }

@@ -200,64 +200,77 @@ impl SolidSpec {
 
     /// Checks each number on its own.
     pub(crate) fn check(&self) -> Result<(), TargetError> {
-        // The mean edge of a cuboid that is not scaled follows from its sides, which are checked below.
+        self.check_edge()?;
+        match &self.shape {
+            SolidShape::Cuboid(sides) => self.check_sides(*sides)?,
+            SolidShape::Mesh(mesh) => self.check_mesh(mesh)?,
+            _ => {}
+        }
+        self.check_faces()?;
+        self.check_tags()
+    }
+
+    fn check_edge(&self) -> Result<(), TargetError> {
+        // The mean edge of a cuboid that is not scaled follows from its sides, which are checked on their own.
         let follows =
             matches!(&self.shape, SolidShape::Cuboid(sides) if mean_side(*sides) == self.edge_mm);
-        if !follows && !SOLID_EDGE_MM.contains(&self.edge_mm) {
-            let edge = format_mm(self.edge_mm);
-            let problem = match &self.shape {
-                SolidShape::Mesh(_) => {
-                    format!(
-                        "the mean is {edge}, not between 10 mm and 5000 mm: set the edge, or scale the mesh to mm"
-                    )
-                }
-                _ => format!("{edge} is not between 10 mm and 5000 mm"),
-            };
-            return Err(TargetError::invalid(SolidEdgeMm, problem));
+        if follows || SOLID_EDGE_MM.contains(&self.edge_mm) {
+            return Ok(());
         }
-        if let SolidShape::Cuboid(sides) = &self.shape {
-            let scale = self.edge_mm / mean_side(*sides);
-            let wrong = |side: &f64| !(*side > 0.0 && SOLID_EDGE_MM.contains(&(side * scale)));
-            if let Some(side) = sides.to_array().into_iter().find(wrong) {
-                let side = format_mm(side * scale);
-                let problem = format!("a side of {side} is not between 10 mm and 5000 mm");
-                return Err(TargetError::invalid(SolidShapeCuboid, problem));
+        let edge = format_mm(self.edge_mm);
+        let problem = match &self.shape {
+            SolidShape::Mesh(_) => {
+                format!(
+                    "the mean is {edge}, not between 10 mm and 5000 mm: set the edge, or scale the mesh to mm"
+                )
             }
+            _ => format!("{edge} is not between 10 mm and 5000 mm"),
+        };
+        Err(TargetError::invalid(SolidEdgeMm, problem))
+    }
+
+    fn check_sides(&self, sides: DVec3) -> Result<(), TargetError> {
+        let scale = self.edge_mm / mean_side(sides);
+        let wrong = |side: &f64| !(*side > 0.0 && SOLID_EDGE_MM.contains(&(side * scale)));
+        let Some(side) = sides.to_array().into_iter().find(wrong) else { return Ok(()) };
+        let problem =
+            format!("a side of {} is not between 10 mm and 5000 mm", format_mm(side * scale));
+        Err(TargetError::invalid(SolidShapeCuboid, problem))
+    }
+
+    fn check_mesh(&self, mesh: &ClosedMesh) -> Result<(), TargetError> {
+        let wrong = |problem: String| Err(TargetError::invalid(SolidShapeMesh, problem));
+        let count = mesh.faces().len();
+        if count > MAX_FACES as usize {
+            return wrong(format!("{count} faces exceed the maximum of {MAX_FACES}"));
         }
-        if let SolidShape::Mesh(mesh) = &self.shape
-            && mesh.faces().len() > MAX_FACES as usize
-        {
-            let problem = format!("{} faces exceed the maximum of {MAX_FACES}", mesh.faces().len());
-            return Err(TargetError::invalid(SolidShapeMesh, problem));
+        let triangles: usize = mesh.faces().iter().map(|face| face.len() - 2).sum();
+        if triangles > MAX_TRIANGLES {
+            return wrong(format!(
+                "its faces consist of {triangles} triangles, which exceeds the maximum of {MAX_TRIANGLES}"
+            ));
         }
-        if let SolidShape::Mesh(mesh) = &self.shape {
-            let triangles: usize = mesh.faces().iter().map(|face| face.len() - 2).sum();
-            if triangles > MAX_TRIANGLES {
-                let problem = format!(
-                    "its faces consist of {triangles} triangles, which exceeds the maximum of {MAX_TRIANGLES}"
-                );
-                return Err(TargetError::invalid(SolidShapeMesh, problem));
-            }
+        let scale = self.edge_mm / mesh.mean_edge();
+        let far = |v: &DVec3| v.abs().max_element() * scale;
+        let farthest = mesh.vertices().iter().map(far).fold(0.0, f64::max);
+        if farthest > FARTHEST_MM {
+            return wrong(format!(
+                "the mesh extends to {} from the origin, more than {}: move it closer to the origin",
+                format_mm(farthest),
+                format_mm(FARTHEST_MM)
+            ));
         }
-        if let SolidShape::Mesh(mesh) = &self.shape {
-            let scale = self.edge_mm / mesh.mean_edge();
-            let far = |v: &DVec3| v.abs().max_element() * scale;
-            let farthest = mesh.vertices().iter().map(far).fold(0.0, f64::max);
-            if farthest > FARTHEST_MM {
-                let problem = format!(
-                    "the mesh extends to {} from the origin, more than {}: move it closer to the origin",
-                    format_mm(farthest),
-                    format_mm(FARTHEST_MM)
-                );
-                return Err(TargetError::invalid(SolidShapeMesh, problem));
-            }
-        }
+        Ok(())
+    }
+
+    fn check_faces(&self) -> Result<(), TargetError> {
+        let margin = format_mm(self.margin_mm);
         if !FACE_TILES.contains(&self.tiles) {
             let problem = format!("{} is not between 6 and 200", self.tiles);
             return Err(TargetError::invalid(SolidTiles, problem));
         }
         if !(0.0..=SOLID_EDGE_MM.end() / 4.0).contains(&self.margin_mm) {
-            let problem = format!("{} is not a valid margin of a face", format_mm(self.margin_mm));
+            let problem = format!("{margin} is not a valid margin of a face");
             return Err(TargetError::invalid(SolidMarginMm, problem));
         }
         if self.board_id.checked_add(MAX_FACES).is_none() {
@@ -267,18 +280,19 @@ impl SolidSpec {
         }
         if self.inverted && self.margin_mm < MIN_INVERTED_MARGIN_MM {
             let problem = format!(
-                "{} leaves no room for a black field around white tiles: use at least {}",
-                format_mm(self.margin_mm),
+                "{margin} leaves no room for a black field around white tiles: use at least {}",
                 format_mm(MIN_INVERTED_MARGIN_MM)
             );
             return Err(TargetError::invalid(SolidMarginMm, problem));
         }
+        Ok(())
+    }
+
+    fn check_tags(&self) -> Result<(), TargetError> {
+        let wrong = |problem| Err(TargetError::invalid(SolidSquareTags, problem));
         let Some(tags) = &self.tags else {
             return match self.square_tags {
-                Some(_) => {
-                    let problem = "the other faces have no tags: omit it";
-                    Err(TargetError::invalid(SolidSquareTags, problem))
-                }
+                Some(_) => wrong("the other faces have no tags: omit it"),
                 None => Ok(()),
             };
         };
@@ -288,24 +302,18 @@ impl SolidSpec {
             let rows = if matches!(self.shape, SolidShape::Mesh(_)) { 2 } else { 1 } * self.tiles;
             tags.check_places(SolidBoardId, boards, SolidTiles, [rows, rows])?;
         }
-        let kind = match (self.shape.tilings(), &self.square_tags) {
-            ([true, true], Some(tags)) => {
-                tags.check(GridKind::Checker)?;
-                GridKind::Deltille
+        match (self.shape.tilings(), &self.square_tags) {
+            ([true, true], Some(square_tags)) => {
+                square_tags.check(GridKind::Checker)?;
+                tags.check(GridKind::Deltille)
             }
-            ([true, false], None) => GridKind::Deltille,
-            ([false, _], None) => GridKind::Checker,
+            ([true, false], None) => tags.check(GridKind::Deltille),
+            ([false, _], None) => tags.check(GridKind::Checker),
             ([true, true], None) => {
-                let problem =
-                    "rectangular faces need square tags, because the others have triangular ones";
-                return Err(TargetError::invalid(SolidSquareTags, problem));
+                wrong("rectangular faces need square tags, because the others have triangular ones")
             }
-            (_, Some(_)) => {
-                let problem = "all faces are of one kind and have one kind of tags: omit it";
-                return Err(TargetError::invalid(SolidSquareTags, problem));
-            }
-        };
-        tags.check(kind)
+            (_, Some(_)) => wrong("all faces are of one kind and have one kind of tags: omit it"),
+        }
     }
 }
 

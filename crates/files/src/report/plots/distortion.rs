@@ -58,16 +58,7 @@ pub(in crate::report) fn curve_plot(
         let low = DVec2::new(farthest.to_degrees(), y[0]);
         axes.bar(low, DVec2::new(widest.to_degrees(), y[1]), "beyond-corners", "");
     }
-    let mut counts = [0usize; BINS];
-    for angle in of_corners {
-        counts[((angle / widest * BINS as f64) as usize).min(BINS - 1)] += 1;
-    }
-    let fullest = counts.into_iter().max().unwrap_or(0).max(1) as f64;
-    for (bin, &count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
-        let at = |bin: usize| (bin as f64 / BINS as f64 * widest).to_degrees();
-        let top = y[0] + 0.12 * (y[1] - y[0]) * count as f64 / fullest;
-        axes.bar(DVec2::new(at(bin), y[0]), DVec2::new(at(bin + 1), top), "count-bar", "");
-    }
+    count_bars(&mut axes, &of_corners, widest, y);
     axes.line(&[DVec2::ZERO, DVec2::new(widest.to_degrees(), 0.0)], "guide");
     for (angle, name) in [(side, "side"), (corner, "corner")] {
         let is_apart = name == "corner" || corner - side > 0.06 * widest;
@@ -88,20 +79,7 @@ pub(in crate::report) fn curve_plot(
         axes.line(&points(near, |at| at.mean_px), "curve second");
     }
     axes.line(&points(&far, |at| at.mean_px), "curve lens");
-    let key = |x: f64, class: &str, text: &str| {
-        format!(
-            "<path class=\"{class}\" d=\"M{x} 10H{}\"/><text x=\"{}\" y=\"14\">{text}</text>",
-            x + 22.0,
-            x + 28.0
-        )
-    };
-    let mut foot = key(0.0, "curve lens", "points at infinity");
-    if let Some((mm, _)) = &near {
-        foot += &key(150.0, "curve second", &format!("{mm:.0} mm away"));
-    }
-    foot += "<rect class=\"beyond-corners\" x=\"272\" y=\"4\" width=\"22\" height=\"12\"/>\
-             <text x=\"300\" y=\"14\">beyond the corners</text>";
-    axes.foot(FOOT, foot);
+    axes.foot(FOOT, legend(near.map(|(mm, _)| mm)));
     let shown = axes.svg(
         ["angle from the axis, °", &format!("radius minus {}, px", ideal.law())],
         "Distortion curve",
@@ -112,6 +90,36 @@ pub(in crate::report) fn curve_plot(
         ideal.name()
     );
     Some((shown, caption))
+}
+
+/// Draws bars at the bottom of the axes from `y[0]` to `y[1]` that count corners by their angle.
+fn count_bars(axes: &mut Axes, angles_rad: &[f64], widest_rad: f64, y: [f64; 2]) {
+    let mut counts = [0usize; BINS];
+    for angle in angles_rad {
+        counts[((angle / widest_rad * BINS as f64) as usize).min(BINS - 1)] += 1;
+    }
+    let fullest = counts.into_iter().max().unwrap_or(0).max(1) as f64;
+    for (bin, &count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
+        let at = |bin: usize| (bin as f64 / BINS as f64 * widest_rad).to_degrees();
+        let top = y[0] + 0.12 * (y[1] - y[0]) * count as f64 / fullest;
+        axes.bar(DVec2::new(at(bin), y[0]), DVec2::new(at(bin + 1), top), "count-bar", "");
+    }
+}
+
+/// The legend of the distortion curve, also for points at a finite distance if there is a curve for them.
+fn legend(near_mm: Option<f64>) -> String {
+    let key = |x: f64, class: &str, text: &str| {
+        format!(
+            "<path class=\"{class}\" d=\"M{x} 10H{}\"/><text x=\"{}\" y=\"14\">{text}</text>",
+            x + 22.0,
+            x + 28.0
+        )
+    };
+    let far = key(0.0, "curve lens", "points at infinity");
+    let near = near_mm.map(|mm| key(150.0, "curve second", &format!("{mm:.0} mm away")));
+    far + &near.unwrap_or_default()
+        + "<rect class=\"beyond-corners\" x=\"272\" y=\"4\" width=\"22\" height=\"12\"/>\
+           <text x=\"300\" y=\"14\">beyond the corners</text>"
 }
 
 /// The straight grid of an ideal lens as distorted by this lens, and the caption.

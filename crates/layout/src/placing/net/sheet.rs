@@ -212,15 +212,19 @@ fn nested(
         };
         return Ok((0..count).map(sheet).collect());
     }
-    let size = sizes.last().map(ToString::to_string).unwrap_or_default();
-    let seams =
-        if paper.size.is_some() { format!(", a larger {PaperSize}") } else { String::new() };
+    Err(too_large_face(spec, paper))
+}
+
+/// Returns the error of a face that is larger than the largest paper.
+fn too_large_face(spec: &SolidSpec, paper: &PaperSpec) -> TargetError {
+    let size = paper.sizes().last().map(ToString::to_string).unwrap_or_default();
+    let larger = paper.size.as_ref().map_or(String::new(), |_| format!(", a larger {PaperSize}"));
     let problem = format!(
-        "a face with {} edges and its tabs is larger than {size}: use {SolidSheetsSeamedNet}{seams}, or a shorter \
+        "a face with {} edges and its tabs is larger than {size}: use {SolidSheetsSeamedNet}{larger}, or a shorter \
          {SolidEdgeMm}",
         format_mm(spec.edge_mm),
     );
-    Err(TargetError::invalid(SolidEdgeMm, problem))
+    TargetError::invalid(SolidEdgeMm, problem)
 }
 
 /// Returns the error of a net that does not fit on the allowed number of pages.
