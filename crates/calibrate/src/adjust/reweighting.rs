@@ -93,11 +93,7 @@ pub(crate) fn settle(
     let start = || CalibrationError::NoStart;
     let all_of = |keep: bool| move |block: &Block| vec![keep; block.observations.len()];
     let none: Vec<Vec<bool>> = problem.blocks.iter().map(all_of(false)).collect();
-    let counting = |problem: &Problem, gross: &[Vec<bool>]| {
-        let kept = gross.iter().zip(&left_out);
-        let kept = kept.map(|(of_block, out)| of_block.iter().map(|far| !far && !out).collect());
-        problem.with_corners(&kept.collect::<Vec<_>>())
-    };
+    let counting = |problem: &Problem, gross: &[Vec<bool>]| counting(problem, gross, &left_out);
     let mut all = problem;
     let mut gross = none.clone();
     if some_stand_out && loss != Loss::Squared {
@@ -132,34 +128,10 @@ pub(crate) fn settle(
             break;
         }
     }
-    // Offsets of corners absorb the smooth residuals of a wrong lens, except at its rim. Corners that
-    // determine the estimate alone count in full: a robust loss would reduce their weight until the
-    // estimate fits the other corners only.
-    let (mut loss, without) = (loss, deviations(&all, &whitening));
-    let mut wrong = wrong_corners(&all, &gross);
-    let mut tried =
-        marked(&all, |block, corner, label| gross[block][corner] && wrong.contains(&label));
-    while all.map.is_some() && gross.iter().flatten().any(|gross| *gross) {
-        let used = counting(&all, &tried);
-        let weights = whitening.of(&used);
-        let Some(with) = minimise(used, &weights, Loss::Squared, Until::Rough) else { break };
-        let with = all.at(&with.problem);
-        let (off, limit) = (deviations(&with, &whitening), whitening.outlier_limit());
-        // The wrong observations of a corner displace it from the others.
-        wrong.extend(wrong_corners(
-            &all,
-            &marked(&all, |block, corner, _| off[block][corner] > limit),
-        ));
-        let contradicted = marked(&all, |block, corner, label| {
-            let is_far = off[block][corner] > SELF_DETERMINED * without[block][corner];
-            gross[block][corner] && (is_far || wrong.contains(&label))
-        });
-        if contradicted == gross {
-            break;
-        }
+    let mut loss = loss;
+    if let Some((with, contradicted)) = without_contradicted(&all, &gross, &left_out, &whitening) {
         (all, loss) = (with, Loss::Squared);
-        (tried, gross) = (contradicted.clone(), contradicted);
-        part = counting(&all, &gross);
+        part = counting(&all, &contradicted);
     }
     if loss == Loss::Squared {
         whitening = Whitening::fit(&part, weights, &residuals(&part));
@@ -170,6 +142,58 @@ pub(crate) fn settle(
     let of_block = |off: Vec<f64>| off.into_iter().map(|off| off > limit).collect();
     let outliers = deviations(&problem, &whitening).into_iter().map(of_block).collect();
     Ok(Settled { minimum, whitening, problem, outliers })
+}
+
+/// The problem without outliers and excluded blocks.
+fn counting(problem: &Problem, outliers: &[Vec<bool>], left_out: &[bool]) -> Problem {
+    let kept = outliers.iter().zip(left_out);
+    let kept = kept.map(|(of_block, out)| of_block.iter().map(|far| !far && !out).collect());
+    problem.with_corners(&kept.collect::<Vec<_>>())
+}
+
+/// If the corners of the target are measured: a solution that includes those gross outliers with which it agrees, and the
+/// outliers that remain; `None` if all of them remain.
+///
+/// Offsets of corners absorb the smooth residuals of a wrong lens, except at its rim. Corners that determine the estimate alone
+/// count in full: a robust loss would reduce their weight until the estimate fits the other corners only.
+fn without_contradicted(
+    all: &Problem,
+    gross: &[Vec<bool>],
+    left_out: &[bool],
+    whitening: &Whitening,
+) -> Option<(Problem, Vec<Vec<bool>>)> {
+    all.map.as_ref()?;
+    let without = deviations(all, whitening);
+    let mut wrong = wrong_corners(all, gross);
+    let mut tried =
+        marked(all, |block, corner, label| gross[block][corner] && wrong.contains(&label));
+    let mut found: Option<(Problem, Vec<Vec<bool>>)> = None;
+    loop {
+        let (all, gross) =
+            found.as_ref().map_or((all, gross), |(all, gross)| (all, gross.as_slice()));
+        if !gross.iter().flatten().any(|gross| *gross) {
+            return found;
+        }
+        let used = counting(all, &tried, left_out);
+        let weights = whitening.of(&used);
+        let Some(with) = minimise(used, &weights, Loss::Squared, Until::Rough) else {
+            return found;
+        };
+        let with = all.at(&with.problem);
+        let (off, limit) = (deviations(&with, whitening), whitening.outlier_limit());
+        // The wrong observations of a corner displace it from the others.
+        let far = marked(all, |block, corner, _| off[block][corner] > limit);
+        wrong.extend(wrong_corners(all, &far));
+        let contradicted = marked(all, |block, corner, label| {
+            let is_far = off[block][corner] > SELF_DETERMINED * without[block][corner];
+            gross[block][corner] && (is_far || wrong.contains(&label))
+        });
+        if contradicted == gross {
+            return found;
+        }
+        tried.clone_from(&contradicted);
+        found = Some((with, contradicted));
+    }
 }
 
 /// A corner of a target: its panel, row and column.

@@ -186,25 +186,7 @@ impl<'a> Messages<'a> {
                 return format!("{who}: {outliers} of {corners} far outside the image; excluded");
             }
             OutlierPattern::Panel { panel, moved } => {
-                let why = match moved {
-                    Some(Moved { by_mm, rotation_rad }) => {
-                        let degrees = rotation_rad.to_degrees();
-                        let turned = match degrees >= TURNED_DEG {
-                            true => format!(" and rotated by {degrees:.1}°"),
-                            false => String::new(),
-                        };
-                        format!(
-                            "the panel seems displaced by {by_mm:.2} mm{turned} from its pose in the target \
-                             file ({CalibrationRefinePanels} estimates the poses of panels)"
-                        )
-                    }
-                    None => {
-                        "no pose of the panel explains them: wrong labels, a sheet that is not flat, or a \
-                             different print"
-                            .to_owned()
-                    }
-                };
-                format!("panel {panel}: {count}: {why}")
+                format!("panel {panel}: {count}: {}", moved_panel(moved.as_ref()))
             }
             OutlierPattern::PanelInView { panel, camera, view, off_px } => {
                 let who = of(camera, format!("view {view}, panel {panel}"));
@@ -430,6 +412,23 @@ impl<'a> Messages<'a> {
             None => text,
         }
     }
+}
+
+/// Cause of outliers on a panel, which a displacement may explain.
+fn moved_panel(moved: Option<&Moved>) -> String {
+    let Some(Moved { by_mm, rotation_rad }) = moved else {
+        return "no pose of the panel explains them: wrong labels, a sheet that is not flat, or a different print"
+            .to_owned();
+    };
+    let degrees = rotation_rad.to_degrees();
+    let turned = match degrees >= TURNED_DEG {
+        true => format!(" and rotated by {degrees:.1}°"),
+        false => String::new(),
+    };
+    format!(
+        "the panel seems displaced by {by_mm:.2} mm{turned} from its pose in the target file ({CalibrationRefinePanels} \
+         estimates the poses of panels)"
+    )
 }
 
 /// Sentence for a model that does not fit the lens at all.

@@ -189,11 +189,77 @@ impl<'a> Chain<'a> {
     }
 }
 
-/// The first column of the unknown parameters of a camera, and the number of their columns.
-fn columns_of(parameters: &[(usize, usize)]) -> (usize, usize) {
-    let columns = || parameters.iter().map(|&(_, column)| column);
-    let first = columns().min().unwrap_or(0);
-    (first, columns().max().map_or(0, |last| last + 1 - first))
+/// The unknowns that a block depends on.
+struct Unknowns<'a> {
+    chain: Chain<'a>,
+    /// The unknown parameters of the camera, with their columns.
+    free: &'a [(usize, usize)],
+    /// The first of these columns, and their number.
+    first: usize,
+    own: usize,
+    /// Of a spline, the columns of each corner, instead of the former.
+    support: Option<Support>,
+}
+
+impl<'a> Unknowns<'a> {
+    /// `None` if a camera with a spline lens cannot image all corners.
+    fn of(problem: &'a Problem, layout: &'a Layout, block: &Block) -> Option<Self> {
+        let chain = Chain::of(problem, layout, block);
+        let free = &layout.parameters[block.camera];
+        let camera = &chain.camera.camera;
+        let support = match camera.lens {
+            Lens::Spline(_) if !free.is_empty() => {
+                let points = problem.camera_points(block);
+                let seen = points.map(|at| camera.project_with_derivatives(at));
+                let seen = seen.collect::<Option<Vec<Projection>>>()?;
+                Support::of(free, &seen, chain.camera.free.len())
+            }
+            _ => None,
+        };
+        let columns = || free.iter().map(|&(_, column)| column);
+        let first = columns().min().unwrap_or(0);
+        let own = columns().max().map_or(0, |last| last + 1 - first);
+        Some(Self { chain, free, first, own, support })
+    }
+
+    /// The shared columns of the block.
+    fn columns(&self) -> Vec<usize> {
+        let poses = self.chain.columns();
+        match &self.support {
+            Some(support) => support.touched.iter().copied().chain(poses).collect(),
+            None => (self.first..self.first + self.own).chain(poses).collect(),
+        }
+    }
+
+    /// Sets a row to the derivatives of a coordinate of a corner with respect to its columns and to the frame's pose.
+    /// `place` is the position on the panel, `by_place` the derivative with respect to it, and `bends` are the directions
+    /// in which the shape bends the corner.
+    #[inline]
+    fn derivatives(
+        &self,
+        at: &Projection,
+        coordinate: usize,
+        place: DVec3,
+        by_place: DVec3,
+        bends: Option<&[DVec3; shape::COUNT]>,
+        row: &mut [f64; LONGEST_ROW],
+    ) {
+        let mut next = 0;
+        if self.support.is_none() {
+            row[..self.own].fill(0.0);
+            for &(parameter, column) in self.free {
+                row[column - self.first] += at.by_parameters[parameter][coordinate];
+            }
+            next = self.own;
+        }
+        let mut push = |value: f64| {
+            row[next] = value;
+            next += 1;
+        };
+        let support = self.support.iter();
+        support.for_each(|support| support.derivatives(at, coordinate, &mut push));
+        self.chain.derivatives(place, by_place, bends, &mut push);
+    }
 }
 
 impl Local {
@@ -205,30 +271,15 @@ impl Local {
         loss: Loss,
         sigma: f64,
     ) -> Option<Self> {
-        let chain = Chain::of(problem, layout, block);
-        let free = &layout.parameters[block.camera];
-        let support = match chain.camera.camera.lens {
-            Lens::Spline(_) if !free.is_empty() => {
-                let points = problem.camera_points(block);
-                let seen = points.map(|at| chain.camera.camera.project_with_derivatives(at));
-                let seen = seen.collect::<Option<Vec<Projection>>>()?;
-                Support::of(free, &seen, chain.camera.free.len())
-            }
-            _ => None,
-        };
-        let poses = chain.columns();
-        let (first, own) = columns_of(free);
-        let columns: Vec<usize> = match &support {
-            Some(support) => support.touched.iter().copied().chain(poses).collect(),
-            None => (first..first + own).chain(poses).collect(),
-        };
+        let unknowns = Unknowns::of(problem, layout, block)?;
+        let Unknowns { chain, support, .. } = &unknowns;
+        let columns = unknowns.columns();
         let n = columns.len() + 6;
         let mut sums = Sums::of(n);
-        let (mut cost, mut corners, mut cross) = (0.0, Vec::new(), Vec::new());
-        if problem.map.is_some() {
-            let count = block.observations.len();
-            (corners, cross) = (Vec::with_capacity(count), Vec::with_capacity(n * count));
-        }
+        let mut cost = 0.0;
+        let unknown = problem.map.as_ref().map_or(0, |_| block.observations.len());
+        let (mut corners, mut cross) =
+            (Vec::with_capacity(unknown), Vec::with_capacity(n * unknown));
         let mut rows = [[0.0; LONGEST_ROW]; 2];
         // For a spline: the columns of the corner, that is, of its knots and all columns after those of the lens.
         let mut places: Vec<usize> = Vec::new();
@@ -240,24 +291,11 @@ impl Local {
             chain.project(place, &mut at)?;
             let panel_from_camera = chain.to_camera.rotation.transpose();
             let by_place = at.by_point.map(|by| panel_from_camera * DVec3::from(by));
-            if let Some(support) = &support {
+            if let Some(support) = support {
                 support.places(&at, n, &mut places);
             }
             for (i, row) in rows.iter_mut().enumerate() {
-                let mut next = 0;
-                if support.is_none() {
-                    row[..own].fill(0.0);
-                    for &(parameter, column) in free {
-                        row[column - first] += at.by_parameters[parameter][i];
-                    }
-                    next = own;
-                }
-                let mut push = |value: f64| {
-                    row[next] = value;
-                    next += 1;
-                };
-                support.iter().for_each(|support| support.derivatives(&at, i, &mut push));
-                chain.derivatives(place, by_place[i], bends.as_ref(), &mut push);
+                unknowns.derivatives(&at, i, place, by_place[i], bends.as_ref(), row);
             }
             let residual = seen.pixel - at.pixel;
             let squared = Whitening::apply(w, residual).length_squared();
@@ -279,15 +317,17 @@ impl Local {
             }
             if let Some(index) = indices.as_mut().and_then(|of| of.next()?) {
                 corners.push(OfCorner::new(index, by_place, residual));
-                let first = cross.len();
-                cross.resize(first + n, [0.0; 3]);
-                let own = &mut cross[first..];
                 let products = rows[0].iter().zip(rows[1]);
                 let products =
                     products.map(|(&x, &y)| (x * by_place[0] + y * by_place[1]).to_array());
                 match support {
-                    Some(_) => places.iter().zip(products).for_each(|(&place, of)| own[place] = of),
-                    None => own.iter_mut().zip(products).for_each(|(own, of)| *own = of),
+                    Some(_) => {
+                        let first = cross.len();
+                        cross.resize(first + n, [0.0; 3]);
+                        let own = &mut cross[first..];
+                        places.iter().zip(products).for_each(|(&place, of)| own[place] = of);
+                    }
+                    None => cross.extend(products),
                 }
             }
         }

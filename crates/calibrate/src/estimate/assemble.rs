@@ -74,18 +74,11 @@ impl Estimate {
         let cameras = cameras.iter().enumerate().map(|(index, camera)| {
             let views = std::mem::take(&mut views[index]);
             let mut camera = camera_estimate(index, camera, views, settled, &found, &covariance);
-            camera.projection = projection(
-                &camera,
-                &states[index],
-                index,
-                settled,
-                distances_mm,
-                observed.as_ref(),
-            );
-            let of_pose = layout.cameras[index].zip(observed.as_ref());
-            camera.observed_pose_sd = of_pose.map(|(first, observed)| {
-                std::array::from_fn(|i| observed.covariance[(first + i, first + i)].sqrt())
-            });
+            let (states, observed) = (&states[index], observed.as_ref());
+            camera.projection = projection(&camera, states, index, settled, distances_mm, observed);
+            let of_pose = layout.cameras[index].zip(observed);
+            camera.observed_pose_sd =
+                of_pose.map(|(first, observed)| sd_from(&observed.covariance, first));
             camera
         });
         let cameras: Vec<CameraEstimate> = cameras.collect();
@@ -105,17 +98,9 @@ impl Estimate {
                 std::array::from_fn(|i| std::array::from_fn(|j| covariance[(first + i, first + j)]))
             }),
         });
-        let of_targets = calibration.targets.iter().zip(&problem.targets).zip(&layout.targets);
-        let targets = of_targets.map(|((given, target), first)| TargetEstimate {
-            name: given.name.clone(),
-            panels: given.panels.clone(),
-            scene_from_target: target.scene_from_target,
-            pose_sd: first
-                .map(|first| std::array::from_fn(|i| covariance[(first + i, first + i)].sqrt())),
-        });
         Ok(Self {
             frames: frame_estimates(&cameras, frames, problem, &found, variance),
-            targets: targets.collect(),
+            targets: target_estimates(calibration, minimum, &covariance),
             panels: panels.collect(),
             joint,
             covariance: joint_covariance,
@@ -164,6 +149,26 @@ fn states(frames: &[&Frame], settled: &Settled, loss: Loss) -> Vec<Option<StateE
     let cameras = 0..minimum.problem.cameras.len();
     let of = |camera| StateEquations::of(&minimum.problem, whitening, loss, camera, &order);
     cameras.map(of).collect()
+}
+
+/// Standard deviations of successive unknowns from a column on.
+fn sd_from<const N: usize>(covariance: &DMatrix<f64>, first: usize) -> [f64; N] {
+    std::array::from_fn(|i| covariance[(first + i, first + i)].sqrt())
+}
+
+fn target_estimates(
+    calibration: &Calibration,
+    Minimum { problem, layout, .. }: &Minimum,
+    covariance: &DMatrix<f64>,
+) -> Vec<TargetEstimate> {
+    let of_targets = calibration.targets.iter().zip(&problem.targets).zip(&layout.targets);
+    let targets = of_targets.map(|((given, target), first)| TargetEstimate {
+        name: given.name.clone(),
+        panels: given.panels.clone(),
+        scene_from_target: target.scene_from_target,
+        pose_sd: first.map(|first| sd_from(covariance, first)),
+    });
+    targets.collect()
 }
 
 fn frame_estimates(
@@ -424,7 +429,7 @@ fn board_shape(minimum: &Minimum, covariance: &DMatrix<f64>, f_ratio: f64) -> Op
     });
     Some(BoardShape {
         shape,
-        sd_mm: std::array::from_fn(|i| covariance[(first + i, first + i)].sqrt()),
+        sd_mm: sd_from(covariance, first),
         f_ratio,
         bent_mm: high - low,
         stretched_mm: beside,

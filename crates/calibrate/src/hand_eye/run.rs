@@ -1,5 +1,7 @@
 //! The joint adjustment of camera, poses, mountings and the noise of the robot.
 
+use glam::DVec3;
+
 use super::contradictions::{self, Contradiction};
 use super::error::{HandEyeError, MIN_POSES};
 use super::estimate::{HandEye, HandEyeView};
@@ -12,9 +14,9 @@ use crate::diagnose::diagnosis::Diagnosis;
 use crate::diagnose::messages::Messages;
 use crate::equations::minimise::{Minimum, Until, minimise};
 use crate::error::CalibrationError;
-use crate::estimate::values::CameraEstimate;
+use crate::estimate::values::{CameraEstimate, Estimate};
 use crate::input::calibration::Calibration;
-use crate::input::robot::RobotNoise;
+use crate::input::robot::{RobotNoise, RobotPose};
 use crate::input::views::Named;
 use crate::matrix::Matrix;
 use crate::problem::bundle::Problem;
@@ -57,56 +59,16 @@ impl Calibration {
         }
         estimate.calibrated_with.clone_from(&self.identities);
         let diagnoses = self.explain(&estimate);
-        let wrong_camera = diagnoses.iter().find(|of| of.blames_camera());
-        let wrong_camera = wrong_camera.map(|of| {
-            let sentence = Messages::new(&estimate, None).sentence(of);
-            (matches!(of, Diagnosis::WrongCamera { .. }), HandEyeError::WrongCamera(sentence))
-        });
-        if let Some((true, error)) = wrong_camera {
-            return Err(error);
-        }
+        let wrong_camera = wrong_camera(&diagnoses, &estimate)?;
         let Settled { minimum, whitening, .. } = settled;
         let variance = variance(&minimum, &whitening, self.loss);
         let of_frame = |frame: &crate::FrameEstimate| pairing.poses.get(&frame.name).copied();
         let indices: Vec<Option<usize>> = estimate.frames.iter().map(of_frame).collect();
-        let paired: Vec<(usize, usize)> = indices
-            .iter()
-            .enumerate()
-            .filter_map(|(frame, pose)| Some((frame, (*pose)?)))
-            .collect();
-        if paired.len() < MIN_POSES {
-            return Err(HandEyeError::TooFew { paired: paired.len() });
-        }
-        let reported = |pose: usize| &asked.robot.poses[pose];
-        let to_base =
-            |pose: usize| readings::base_from_flange(reported(pose), asked.robot.are_inverse);
-        let rotation_spread =
-            rotation_spread(paired.iter().map(|&(_, pose)| to_base(pose).rotation));
-        let seen =
-            paired.iter().map(|&(frame, _)| minimum.problem.frames[frame].rotation.conjugate());
-        check_rotations(seen).map_err(|why| {
-            let axis = rotation_spread[0].1;
-            HandEyeError::Motion { why, axis, mounting: asked.mounting }
-        })?;
-        let start = readings::start(
-            &paired
-                .iter()
-                .map(|&(frame, pose)| Paired {
-                    robot: reported(pose),
-                    camera_from_board: minimum.problem.frames[frame],
-                })
-                .collect::<Vec<_>>(),
-            asked.mounting,
-            asked.robot.are_inverse,
-        )
-        .map_err(|error| {
-            let turned = paired.iter().map(|&(_, pose)| to_base(pose).rotation);
-            match (&error, check_rotations(turned), wrong_camera) {
-                (HandEyeError::NoAgreement { .. }, Err(_), _) => HandEyeError::Still,
-                (HandEyeError::NoAgreement { .. }, _, Some((_, camera))) => camera,
-                _ => error,
-            }
-        })?;
+        let paired = indices.iter().zip(&minimum.problem.frames).filter_map(|(pose, frame)| {
+            Some(Paired { robot: &asked.robot.poses[(*pose)?], camera_from_board: *frame })
+        });
+        let (start, rotation_spread) = start(&paired.collect::<Vec<_>>(), asked, wrong_camera)?;
+        let to_base = |pose: usize| asked.base_from_flange(&asked.robot.poses[pose]);
         let measured: Vec<Option<Pose>> = indices.iter().map(|pose| pose.map(to_base)).collect();
         let problem = with_robot(minimum.problem, asked, start, &measured, variance);
         let joint = adjusted(problem, &whitening, self, asked.noise, &measured)?;
@@ -151,6 +113,55 @@ impl Calibration {
             cameras: estimate,
         })
     }
+}
+
+impl HandEyeRequest {
+    /// `base_from_flange` of a reported pose.
+    fn base_from_flange(&self, reported: &RobotPose) -> Pose {
+        readings::base_from_flange(reported, self.robot.are_inverse)
+    }
+}
+
+/// The error if a given camera may not have taken the images.
+///
+/// # Errors
+/// Returns this error if it certainly did not.
+fn wrong_camera(
+    diagnoses: &[Diagnosis],
+    estimate: &Estimate,
+) -> Result<Option<HandEyeError>, HandEyeError> {
+    let Some(wrong) = diagnoses.iter().find(|of| of.blames_camera()) else { return Ok(None) };
+    let error = HandEyeError::WrongCamera(Messages::new(estimate, None).sentence(wrong));
+    match wrong {
+        Diagnosis::WrongCamera { .. } => Err(error),
+        _ => Ok(Some(error)),
+    }
+}
+
+/// Initial mountings, and the spread of the robot's rotations; `wrong_camera` explains why no mountings fit.
+fn start(
+    paired: &[Paired<'_>],
+    asked: &HandEyeRequest,
+    wrong_camera: Option<HandEyeError>,
+) -> Result<(Start, [(f64, DVec3); 3]), HandEyeError> {
+    if paired.len() < MIN_POSES {
+        return Err(HandEyeError::TooFew { paired: paired.len() });
+    }
+    let rotations = || paired.iter().map(|of| asked.base_from_flange(of.robot).rotation);
+    let spread = rotation_spread(rotations());
+    let seen = paired.iter().map(|of| of.camera_from_board.rotation.conjugate());
+    check_rotations(seen).map_err(|why| {
+        let axis = spread[0].1;
+        HandEyeError::Motion { why, axis, mounting: asked.mounting }
+    })?;
+    let start = readings::start(paired, asked.mounting, asked.robot.are_inverse);
+    let start =
+        start.map_err(|error| match (&error, check_rotations(rotations()), wrong_camera) {
+            (HandEyeError::NoAgreement { .. }, Err(_), _) => HandEyeError::Still,
+            (HandEyeError::NoAgreement { .. }, _, Some(camera)) => camera,
+            _ => error,
+        })?;
+    Ok((start, spread))
 }
 
 /// The problem with the links to the robot, and with the parameters of a known camera unknown within their covariance.
