@@ -46,6 +46,24 @@ fn upper_bound(family: &Family) -> (u64, &'static str) {
     }
 }
 
+/// Returns the properties of a family as JSON.
+fn described(family: &Family) -> Value {
+    let (bound, _) = upper_bound(family);
+    let mut described = json!({
+        "name": family.name(), "fingerprint": family.fingerprint(), "codes": family.len(),
+        "bits": family.dimension().bits(), "distance": family.distance(),
+        "corrects": family.correctable(), "rules": family.rules(),
+        "construction": family.construction(), "upper_bound": bound,
+        "distance_histogram": family.histogram(),
+    });
+    let left = without_hidden(family);
+    let left = left.iter().map(|(cells, left)| (cells.name().to_owned(), json!(left)));
+    described["distance_without"] = left.collect::<serde_json::Map<_, _>>().into();
+    described["beginnings"] = json!(family.beginnings());
+    false_positives::add_to(&mut described, family);
+    described
+}
+
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let [of, other] = &args.families[..] {
         let [of, other] = [resolve(of)?, resolve(other)?];
@@ -60,22 +78,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let family = resolve(name)?;
     if args.result_format.is_json() {
-        let (bound, _) = upper_bound(&family);
-        let mut described = json!({
-            "name": family.name(), "fingerprint": family.fingerprint(), "codes": family.len(),
-            "bits": family.dimension().bits(), "distance": family.distance(),
-            "corrects": family.correctable(), "rules": family.rules(),
-            "construction": family.construction(), "upper_bound": bound,
-            "distance_histogram": family.histogram(),
-        });
-        let left = without_hidden(&family);
-        let left = left.iter().map(|(cells, left)| (cells.name().to_owned(), json!(left)));
-        described["distance_without"] = left.collect::<serde_json::Map<_, _>>().into();
-        described["beginnings"] = json!(family.beginnings());
-        false_positives::add_to(&mut described, &family);
-        output::print_json(&described)?;
+        output::print_json(&described(&family))?;
         return Ok(ExitCode::SUCCESS);
     }
+    print(&family)?;
+    false_positives::print(&family)?;
+    print_distances(&family)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Prints the properties of a family.
+fn print(family: &Family) -> anyhow::Result<()> {
     let (bits, rules) = (family.dimension().bits(), family.rules());
     let pairs = TagWords::new(family.dimension()).without(family.free_cells()).pairs();
     say!("{}, fingerprint {}", family.name(), family.fingerprint());
@@ -86,7 +99,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let cells = counted(family.free_cells().count_ones() as usize, "cell");
         say!("  free            {cells}, the {}: not used by any code", free.name());
     }
-    for (hidden, left) in without_hidden(&family) {
+    for (hidden, left) in without_hidden(family) {
         let cells = hidden.count(family.dimension());
         let what = match hidden {
             HiddenCells::Apex => format!("the {cells} cells of a corner"),
@@ -122,7 +135,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         0 => String::new(),
         free => format!(", of the {} cells in use", bits - free),
     };
-    let (bound, by) = upper_bound(&family);
+    let (bound, by) = upper_bound(family);
     say!("  upper bound     {bound} codes ({by}{of_cells})");
     let [rows, cols] = BOARD;
     let board = tags_of(&TargetSpec::Board(BoardSpec::new(GridKind::Deltille, rows, cols, 20.0)))?;
@@ -135,10 +148,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         "  enough for      {} of {rows} x {cols} corners ({board} tags each) or {solids} ({solid} tags each)",
         counted(family.len() / board, "board")
     );
-    false_positives::print(&family)?;
+    Ok(())
+}
+
+/// Prints the histogram of distances between codes.
+fn print_distances(family: &Family) -> anyhow::Result<()> {
     if family.histogram().is_empty() {
         say!("  distances       not counted for this many codes");
-        return Ok(ExitCode::SUCCESS);
+        return Ok(());
     }
     say!("  number of word pairs, all rotations included, by distance");
     let most = family.histogram().values().copied().max().unwrap_or(1) as f64;
@@ -146,5 +163,5 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let bar = "█".repeat((40.0 * *pairs as f64 / most).ceil() as usize);
         say!("    {distance:>3} {pairs:>12} {bar}");
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }

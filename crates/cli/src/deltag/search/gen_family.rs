@@ -207,31 +207,33 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Some(message) => log!("interrupted: {message}"),
         None => file.finish()?,
     }
-    if let Some(family) = family.as_ref().filter(|f| !is_whole && f.len() > PAIRS_COUNTED) {
-        say!(
-            "{}: {} of {} bits; verify with `deltag verify-family`; fingerprint {}",
-            path.display(),
-            counted(family.len(), "code"),
-            dimension.bits(),
-            family.fingerprint()
-        );
-    } else if let Some(family) = family {
-        let certificate = certify_codes(&family);
-        ensure!(certificate.is_valid(), "{}: {}", path.display(), certificate.failures.join("; "));
-        say!(
-            "{}: {} of {} bits; {}; fingerprint {}",
-            path.display(),
-            counted(family.len(), "code"),
-            dimension.bits(),
-            proof_of(&certificate, distance),
-            family.fingerprint()
-        );
-        let shipped = Family::shipped(family.name());
-        if is_whole && shipped.is_ok_and(|shipped| shipped.fingerprint() == family.fingerprint()) {
-            log!("note: the same codes ship with the program as {}", family.name());
-        }
+    if let Some(family) = &family {
+        describe(family, &path, distance, is_whole)?;
     }
     Ok(exit)
+}
+
+/// Prints the properties of a written family, certified unless it is large and its search was interrupted.
+fn describe(family: &Family, path: &Path, distance: u32, is_whole: bool) -> anyhow::Result<()> {
+    let proof = if is_whole || family.len() <= PAIRS_COUNTED {
+        let certificate = certify_codes(family);
+        ensure!(certificate.is_valid(), "{}: {}", path.display(), certificate.failures.join("; "));
+        proof_of(&certificate, distance)
+    } else {
+        "verify with `deltag verify-family`".to_owned()
+    };
+    say!(
+        "{}: {} of {} bits; {proof}; fingerprint {}",
+        path.display(),
+        counted(family.len(), "code"),
+        family.dimension().bits(),
+        family.fingerprint()
+    );
+    let shipped = Family::shipped(family.name());
+    if is_whole && shipped.is_ok_and(|shipped| shipped.fingerprint() == family.fingerprint()) {
+        log!("note: the same codes ship with the program as {}", family.name());
+    }
+    Ok(())
 }
 
 /// Appends the known codes to those of an older family.

@@ -98,24 +98,31 @@ fn range(text: &str) -> Result<Distances, String> {
     }
 }
 
+impl Args {
+    /// Returns the focal length and the image size, px.
+    fn focal_and_size_px(&self) -> anyhow::Result<(f64, [u32; 2])> {
+        match (&self.camera, self.size) {
+            (Some(path), _) => {
+                let camera = camera_file::read("--camera", path)?;
+                ensure!(
+                    camera.lens.is_perspective(),
+                    "--camera: a fisheye has no single focal length; use --size and --fov for the part of the image in \
+                     which the board will appear"
+                );
+                Ok((camera.focal_px.min_element(), [camera.width, camera.height]))
+            }
+            (None, Some(size)) => {
+                let half = self.fov.unwrap_or(60.0).to_radians() / 2.0;
+                Ok((f64::from(size[0]) / 2.0 / half.tan(), size))
+            }
+            (None, None) => bail!("--size (the image size) or --camera is needed"),
+        }
+    }
+}
+
 /// Proposes a board and prints the distances at which it can be used.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let (focal_px, size_px) = match (&args.camera, args.size) {
-        (Some(path), _) => {
-            let camera = camera_file::read("--camera", path)?;
-            ensure!(
-                camera.lens.is_perspective(),
-                "--camera: a fisheye has no single focal length; use --size and --fov for the part of the image in \
-                 which the board will appear"
-            );
-            (camera.focal_px.min_element(), [camera.width, camera.height])
-        }
-        (None, Some(size)) => {
-            let half = args.fov.unwrap_or(60.0).to_radians() / 2.0;
-            (f64::from(size[0]) / 2.0 / half.tan(), size)
-        }
-        (None, None) => bail!("--size (the image size) or --camera is needed"),
-    };
+    let (focal_px, size_px) = args.focal_and_size_px()?;
     if !args.distance.has_unit {
         log!("note: --distance has no unit and was read as mm");
     }

@@ -325,49 +325,8 @@ impl BoardSettings {
                  --template"
             );
         };
-        let paper = PaperSpec {
-            size: self.paper.as_deref().map(str::parse).transpose().context("--paper")?,
-            orientation: match &self.orientation {
-                Some(text) => text.parse().context("--orientation")?,
-                None => Default::default(),
-            },
-            margin_mm: length("margin", &self.margin)?.unwrap_or(DEFAULT_MARGIN_MM),
-            poster: self.poster,
-            packed: self.pack,
-            note: self.note.clone(),
-            tag_ids: self.tag_ids,
-            guide_page: self.guide_page,
-            ..PaperSpec::default()
-        };
-        let height = length("logo-height", &self.logo_height)?;
-        let paper = logo::on(paper, self.logo.as_deref(), height)?;
-        if grid == GridKind::Deltille && self.tags_in.is_some() {
-            bail!(
-                "--tags-in has no effect, because tags of a deltille board are always in its black tiles; remove it"
-            );
-        }
-        if grid == GridKind::Checker && self.dense {
-            bail!("--dense: position codes need triangular tiles; use `deltille board`");
-        }
-        let of_tags = self.of_tags();
-        check_tags(self.untagged, self.dense, &of_tags)?;
-        let family = if self.dense { Some(positions::NAME) } else { self.family.as_deref() };
-        let usual = TagSpec::usual(grid, family, self.tags_in.unwrap_or_default());
-        let tagged = !self.untagged && (grid == GridKind::Deltille || self.family.is_some());
-        if grid == GridKind::Checker
-            && self.family.is_none()
-            && let Some((option, _)) = of_tags.iter().find(|(_, given)| *given)
-        {
-            bail!("{option} needs tags: set their family with --tags");
-        }
-        let hole_mm = length("hole", &self.hole)?;
-        let tags = tagged.then(|| TagSpec {
-            hole_mm,
-            first_id: self.first_id.unwrap_or(usual.first_id),
-            spacing: self.tag_spacing.unwrap_or(usual.spacing),
-            border_bits: self.tag_border.unwrap_or(usual.border_bits),
-            ..usual
-        });
+        let paper = self.paper()?;
+        let tags = self.tags(grid)?;
         let mut spec = BoardSpec {
             grid,
             rows,
@@ -409,6 +368,57 @@ impl BoardSettings {
             dsc: self.dsc.then_some(dialect),
             dpi,
         })
+    }
+
+    /// Parses the settings of the paper, and reads the logo.
+    fn paper(&self) -> anyhow::Result<PaperSpec> {
+        let paper = PaperSpec {
+            size: self.paper.as_deref().map(str::parse).transpose().context("--paper")?,
+            orientation: match &self.orientation {
+                Some(text) => text.parse().context("--orientation")?,
+                None => Default::default(),
+            },
+            margin_mm: length("margin", &self.margin)?.unwrap_or(DEFAULT_MARGIN_MM),
+            poster: self.poster,
+            packed: self.pack,
+            note: self.note.clone(),
+            tag_ids: self.tag_ids,
+            guide_page: self.guide_page,
+            ..PaperSpec::default()
+        };
+        let height = length("logo-height", &self.logo_height)?;
+        logo::on(paper, self.logo.as_deref(), height)
+    }
+
+    /// Returns the tags of a board, if it has any.
+    fn tags(&self, grid: GridKind) -> anyhow::Result<Option<TagSpec>> {
+        if grid == GridKind::Deltille && self.tags_in.is_some() {
+            bail!(
+                "--tags-in has no effect, because tags of a deltille board are always in its black tiles; remove it"
+            );
+        }
+        if grid == GridKind::Checker && self.dense {
+            bail!("--dense: position codes need triangular tiles; use `deltille board`");
+        }
+        let of_tags = self.of_tags();
+        check_tags(self.untagged, self.dense, &of_tags)?;
+        let family = if self.dense { Some(positions::NAME) } else { self.family.as_deref() };
+        let usual = TagSpec::usual(grid, family, self.tags_in.unwrap_or_default());
+        let tagged = !self.untagged && (grid == GridKind::Deltille || self.family.is_some());
+        if grid == GridKind::Checker
+            && self.family.is_none()
+            && let Some((option, _)) = of_tags.iter().find(|(_, given)| *given)
+        {
+            bail!("{option} needs tags: set their family with --tags");
+        }
+        let hole_mm = length("hole", &self.hole)?;
+        Ok(tagged.then(|| TagSpec {
+            hole_mm,
+            first_id: self.first_id.unwrap_or(usual.first_id),
+            spacing: self.tag_spacing.unwrap_or(usual.spacing),
+            border_bits: self.tag_border.unwrap_or(usual.border_bits),
+            ..usual
+        }))
     }
 
     /// Returns the tag options, and whether each is given.
