@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 
 use super::checking::{OfBoard, new_views};
 use crate::boundary::arrays::column;
-use crate::boundary::errors::{raised, unlocked};
+use crate::boundary::errors::{self, raised, unlocked};
 use crate::targets::target::Targets;
 
 /// The errors of measured lengths, with their uncertainties.
@@ -213,19 +213,7 @@ pub fn accept_of(
     if has_table && lengths.is_empty() {
         return Err(wrong("lengths: the list is empty".to_owned()));
     }
-    if limit_mm.is_some_and(|mm| !(mm.is_finite() && mm > 0.0)) {
-        return Err(wrong("limit_mm: expected a positive number".to_owned()));
-    }
-    if limit_mm.is_none() && limit_per_length != 0.0 {
-        return Err(wrong("limit_per_length: pass limit_mm, too".to_owned()));
-    }
-    // The reciprocal, L/5000 as 5000, would accept everything.
-    if !(0.0..1.0).contains(&limit_per_length) {
-        return Err(wrong(
-            "limit_per_length: expected mm of error per mm of length, such as 1/5000".to_owned(),
-        ));
-    }
-    let limit = limit_mm.map(|constant_mm| Limit { constant_mm, per_length: limit_per_length });
+    let limit = limit_of(limit_mm, limit_per_length)?;
     let temperature = match (temperature_c, expansion_ppm) {
         (None, None) => None,
         (Some(celsius), Some(ppm_per_k)) => {
@@ -241,4 +229,20 @@ pub fn accept_of(
     let found = unlocked(py, move || views.accept(&before, &request))?;
     let found = found.map_err(|error| wrong(error.to_string()))?;
     Ok(Acceptance { found, has_table })
+}
+
+/// Checks the largest permitted error.
+fn limit_of(limit_mm: Option<f64>, per_length: f64) -> PyResult<Option<Limit>> {
+    let wrong = |what: &str| Err(errors::calibration(what.to_owned()));
+    if limit_mm.is_some_and(|mm| !(mm.is_finite() && mm > 0.0)) {
+        return wrong("limit_mm: expected a positive number");
+    }
+    if limit_mm.is_none() && per_length != 0.0 {
+        return wrong("limit_per_length: pass limit_mm, too");
+    }
+    // The reciprocal, L/5000 as 5000, would accept everything.
+    if !(0.0..1.0).contains(&per_length) {
+        return wrong("limit_per_length: expected mm of error per mm of length, such as 1/5000");
+    }
+    Ok(limit_mm.map(|constant_mm| Limit { constant_mm, per_length }))
 }

@@ -9,7 +9,7 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 
 use super::pickled::{Part, pickled, restored};
-use super::solving::Solved;
+use super::solved::Solved;
 use super::views::{View, residual_arrays};
 use crate::boundary::arrays::{self, distance, record};
 use crate::boundary::errors::{raised, unlocked};

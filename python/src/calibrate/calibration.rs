@@ -16,7 +16,7 @@ use pyo3::prelude::*;
 use super::calibrated_camera::CalibratedCamera;
 use super::joint_covariance::JointCovariance;
 use super::pickled::{of_text, pickled, restored};
-use super::solving::Solved;
+use super::solved::Solved;
 use super::views::{Diagnosis, Excluded};
 use crate::boundary::arrays::{self, record};
 use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};

@@ -16,7 +16,8 @@ use pyo3::prelude::*;
 
 use super::calibrated_camera::CalibratedCamera;
 use super::calibration::Rig;
-use super::solving::{Solved, print_scale_of};
+use super::solved::Solved;
+use super::solving::print_scale_of;
 use crate::boundary::arrays::{self, distance};
 use crate::boundary::errors::{self, Raise, raised, unlocked};
 use crate::see::camera::Camera;

@@ -4,8 +4,8 @@
 //! order:
 //!
 //! 1. `keywords` contains the functions `calibrate` and `rig`.
-//! 2. `solving` checks their arguments, and solves.
-//! 3. `calibration` is the result, `calibrated_camera` one of its cameras, `views` its views and diagnoses,
+//! 2. `solving` checks their arguments, and solves; `solved` is the result with its file, report and diagnoses.
+//! 3. `calibration` is the result in Python, `calibrated_camera` one of its cameras, `views` its views and diagnoses,
 //!    `joint_covariance` the covariance of all unknowns.
 //! 4. `pickled` restores each of these after pickling.
 //! 5. `next_view` proposes the next view.
@@ -25,6 +25,7 @@ pub mod keywords;
 pub mod next_view;
 mod pickled;
 pub mod robots;
+mod solved;
 mod solving;
 pub mod timing;
 pub mod views;

@@ -6,7 +6,7 @@ use deltille::export::saved;
 use deltille::layout::Printing;
 use pyo3::prelude::*;
 
-use super::solving::Solved;
+use super::solved::Solved;
 use crate::boundary::errors::{self, Raise};
 
 /// Data to restore part of a calibration: its whole text, the targets, the camera, and the view, if any.

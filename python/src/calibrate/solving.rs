@@ -5,21 +5,20 @@ use std::path::Path;
 use std::sync::Arc;
 
 use deltille::calibrate::{
-    Calibration, CalibrationError, Candidate, Constraint, ConstraintError, Diagnosis, Estimate,
-    Excluded, Intrinsics, Loss, Messages, Model, PanelPrior, PoseUncertainty, Reference,
-    UntaggedGrid, View, Weights, views,
+    Calibration, CalibrationError, CameraViews, Candidate, Constraint, ConstraintError, Diagnosis,
+    Excluded, Intrinsics, Loss, Messages, Model, Reference, UntaggedGrid, Weights, views,
 };
-use deltille::export::calibration::{Print, Residuals};
+use deltille::export::calibration::Print;
 use deltille::export::sheet::Sheet;
-use deltille::export::{calibration, rig};
 use deltille::layout::Printing;
 use deltille::raster::CameraNotes;
-use deltille::report::{Report, camera_notes};
+use deltille::report::camera_notes;
+use deltille::targets::TargetIdentity;
 use deltille::{camera, detect, targets};
 use deltille_core::quantity::{board_accuracy_mm, distance_mm, edge_mm, print_scale};
 use pyo3::prelude::*;
-use serde_json::Value;
 
+use super::solved::Solved;
 use crate::boundary::arrays::{number, vector, whole};
 use crate::boundary::errors::{self, Raise, raised, warn};
 use crate::boundary::interrupt::interruptible;
@@ -168,6 +167,23 @@ impl How {
             sheet: Sheet { print_scale, ..Sheet::default() },
         })
     }
+
+    /// Returns a calibration with these options.
+    fn applied_to(self, calibration: Calibration) -> Calibration {
+        let calibration = calibration
+            .loss(self.loss)
+            .weights(self.weights)
+            .board_shape(self.board_shape)
+            .measure_target(self.measure_target)
+            .refine_panels(self.refine_target)
+            .distances_mm(self.distances_mm)
+            .covariance_of_all(self.covariance_of_all)
+            .hold_out(self.hold_out);
+        match self.board_accuracy_mm {
+            Some(mm) => calibration.board_accuracy_mm(Some(mm)),
+            None => calibration,
+        }
+    }
 }
 
 /// One text or several.
@@ -239,6 +255,22 @@ impl ModelChoice {
         }
     }
 
+    /// Sets the models of unknown cameras; returns the candidates by camera, if they were selected automatically.
+    fn choose(
+        self,
+        calibration: &mut Calibration,
+    ) -> Result<Vec<Vec<Candidate>>, CalibrationError> {
+        let mut models = vec![Vec::new(); calibration.cameras().len()];
+        for (camera, tried) in models.iter_mut().enumerate() {
+            if self.0.is_none() && calibration.cameras()[camera].intrinsics.model().is_some() {
+                let (chosen, candidates) = calibration.choose_model(camera, &Model::CANDIDATES)?;
+                calibration.set_intrinsics(camera, chosen);
+                *tried = candidates;
+            }
+        }
+        Ok(models)
+    }
+
     /// Returns the model with the most parameters among the choices.
     pub fn richest(self) -> Model {
         self.0.unwrap_or(Model::ThinPrism)
@@ -293,156 +325,68 @@ pub fn assume(detections: &mut Named, targets: &[targets::Target]) {
     }
 }
 
-/// The result of a calibration.
-pub struct Solved {
-    pub estimate: Estimate,
-    pub diagnoses: Vec<Diagnosis>,
-    pub print: Print,
-    /// Poses of the panels in the target's file.
-    pub stated: Vec<PanelPrior>,
-    /// The models compared, by camera.
-    pub models: Vec<Vec<Candidate>>,
-    /// Metadata of the photographs, by camera; absent if it was read from a file.
-    pub notes: BTreeMap<usize, CameraNotes>,
-    pub targets: Vec<Printing>,
-    /// Uncertainties of poses of the targets; empty if it was read from a file, which lists them.
-    pub poses: Vec<PoseUncertainty>,
-    pub model: String,
-    /// Whether it is a rig, which may have a single camera.
-    pub is_rig: bool,
-    /// The text and content of the file it was read from.
-    pub file: Option<(String, Value)>,
-}
-
-impl Solved {
-    /// Creates a result from the content of a file.
-    pub fn read(estimate: Estimate, targets: Vec<Printing>, model: String, text: &str) -> Self {
-        let whole: Option<Value> = serde_json::from_str(text).ok();
-        let file = whole.map(|whole| (text.to_owned(), whole));
-        let (diagnoses, models) = (Vec::new(), Vec::new());
-        Self {
-            estimate,
-            diagnoses,
-            print: Print::default(),
-            stated: Vec::new(),
-            models,
-            notes: BTreeMap::new(),
-            targets,
-            poses: Vec::new(),
-            model,
-            is_rig: file.as_ref().is_some_and(|(_, whole)| whole.get("cameras").is_some()),
-            file,
-        }
-    }
-
-    /// Returns the content of the file it was read from, restricted to a camera if there are several.
-    pub fn in_file(&self, camera: Option<usize>) -> Option<&Value> {
-        let (_, whole) = self.file.as_ref()?;
-        Some(camera.and_then(|camera| whole["cameras"].get(camera)).unwrap_or(whole))
-    }
-
-    /// Whether all data for a report is known. A file contains the sentences of diagnoses, but not their data.
-    pub fn is_whole(&self) -> bool {
-        let is_said =
-            |file: &Value| file["diagnoses"].as_array().is_some_and(|all| !all.is_empty());
-        let is_lost = |file| self.targets.is_empty() || is_said(file);
-        self.has_corners() && !self.in_file(None).is_some_and(is_lost)
-    }
-
-    /// Whether the corners it was calibrated from are known.
-    pub fn has_corners(&self) -> bool {
-        self.estimate.cameras.iter().any(|camera| camera.corner_count() > 0)
-    }
-
-    /// Returns the text that the programs write.
-    pub fn json(&self, residuals: Residuals) -> String {
-        if let Some((text, _)) = &self.file {
-            return text.clone();
-        }
-        let Self { estimate, diagnoses, print, poses, .. } = self;
-        match self.is_rig {
-            true => rig::write(estimate, diagnoses, &self.model, *print, residuals, poses),
-            false => calibration::write(estimate, diagnoses, *print, residuals, poses)
-                .unwrap_or_default(),
-        }
-    }
-
-    /// Whether two results are equal, corner by corner if the corners of both are known.
-    pub fn is_same(&self, other: &Self) -> bool {
-        let has_corners = self.has_corners() && other.has_corners();
-        let content = |solved: &Self| {
-            let listed = if has_corners { Residuals::Listed } else { Residuals::Omitted };
-            let mut whole: Value = serde_json::from_str(&solved.json(listed)).unwrap_or_default();
-            if !has_corners {
-                forget_corners(&mut whole);
-            }
-            whole
-        };
-        content(self) == content(other)
-    }
-
-    /// Fails if the result, read from a file, lacks what a report shows.
-    pub fn check_whole(&self) -> PyResult<()> {
-        if self.is_whole() {
-            return Ok(());
-        }
-        let what = "this calibration lacks data for a report: write the report directly after calibrating; if there are \
-                    no diagnoses, you can instead save with residuals=True and load with the target";
-        Err(errors::calibration(what.to_owned()))
-    }
-
-    /// Returns the report.
-    pub fn page<'a>(&'a self, title: &'a str) -> Report<'a> {
-        let mut page = Report::new(title, &self.estimate);
-        page.poses = &self.poses;
-        (page.diagnoses, page.stated) = (&self.diagnoses, &self.stated);
-        (page.print, page.models) = (self.print, &self.models);
-        page.notes = self.notes.clone();
-        page
-    }
-
-    /// Returns the diagnoses as plain data with a sentence each, and whether each is a failure.
-    pub fn said(&self) -> Vec<(Value, bool)> {
-        if let Some(file) = self.in_file(None) {
-            let is_failure =
-                |record: &Value| record["kind"].as_str().is_some_and(calibration::is_failure);
-            return records_of(file)
-                .into_iter()
-                .map(|record| (record.clone(), is_failure(&record)))
-                .collect();
-        }
-        let file = serde_json::from_str(&self.json(Residuals::Omitted)).unwrap_or_default();
-        let records = records_of(&file);
-        let words = Messages::new(&self.estimate, self.print.scale);
-        let said = |diagnosis: &Diagnosis| {
-            let text = words.sentence(diagnosis);
-            let record = records.iter().find(|record| record["text"] == text.as_str());
-            let record = record.cloned().unwrap_or_else(|| serde_json::json!({ "text": text }));
-            (record, diagnosis.is_failure())
-        };
-        self.diagnoses.iter().map(said).collect()
-    }
-}
-
-/// Removes the lists of corners from the content of a file.
-fn forget_corners(of: &mut Value) {
-    for view in of["views"].as_array_mut().into_iter().flatten() {
-        view.as_object_mut().map(|view| view.remove("corners"));
-    }
-    of["cameras"].as_array_mut().into_iter().flatten().for_each(forget_corners);
-}
-
-/// Returns the findings and diagnoses in a file.
-fn records_of(file: &Value) -> Vec<Value> {
-    let all = ["findings", "diagnoses"].map(|list| file[list].as_array().cloned());
-    all.into_iter().flatten().flatten().collect()
-}
-
 /// A known or unknown camera with its detections.
 pub struct OneCamera {
     pub name: String,
     pub detections: Named,
     pub known: Option<camera::Camera>,
+}
+
+/// What the detections of all cameras give.
+#[derive(Default)]
+struct Input {
+    cameras: Vec<CameraViews>,
+    /// The targets that detections name.
+    named: Vec<TargetIdentity>,
+    left_out: Vec<Excluded>,
+    ink: Vec<detect::InkEstimate>,
+    notes: BTreeMap<usize, CameraNotes>,
+}
+
+impl Input {
+    /// Adds a camera, with unknown intrinsics unless they are known; `is_of_many` if there are several.
+    fn add(
+        &mut self,
+        py: Python<'_>,
+        OneCamera { name, mut detections, known }: OneCamera,
+        is_of_many: bool,
+        unknown: Model,
+        seen: &Seen,
+        how: &How,
+    ) -> PyResult<()> {
+        let wrong = |what: String| Err(errors::calibration(format!("{name}: {what}")));
+        let reference = seen.reference();
+        let mut taken = BTreeSet::new();
+        let mut names = detections.iter().map(|(name, _)| name);
+        if let (true, Some(twice)) = (is_of_many, names.find(|&name| !taken.insert(name))) {
+            return wrong(format!("two images are named {twice}"));
+        }
+        self.ink.extend(detections.iter().filter_map(|(_, found)| {
+            let ink = found.ink?;
+            Some(if let Seen::Grid(grid) = seen { ink.on_print(grid.edge_mm) } else { ink })
+        }));
+        let notes = camera_notes(detections.iter().map(|(_, found)| found));
+        self.notes.extend(notes.map(|notes| (self.cameras.len(), notes)));
+        if how.assume_target {
+            assume(&mut detections, reference.targets());
+        }
+        self.named.extend(detections.iter().flat_map(|(_, found)| found.targets.clone()));
+        let shown = views(&detections, &reference).raise(errors::calibration)?;
+        if let Some(mixed) = &shown.mixed {
+            warn(py, &format!("{name}: {mixed}"))?;
+        }
+        let camera = is_of_many.then(|| name.clone());
+        let left_out = shown.excluded.into_iter();
+        self.left_out.extend(left_out.map(|(_, out)| Excluded { camera: camera.clone(), ..out }));
+        let mut views = shown.views;
+        how.sheet.put_on(seen.targets().first(), &mut views).raise(errors::calibration)?;
+        if views.is_empty() {
+            return wrong("no image shows the target".to_owned());
+        }
+        let intrinsics = known.map_or(Intrinsics::Unknown(unknown), Intrinsics::Known);
+        self.cameras.push(CameraViews::new(&name, views, intrinsics));
+        Ok(())
+    }
 }
 
 /// Calibrates cameras.
@@ -454,90 +398,29 @@ pub fn solve(
     model: ModelChoice,
     mut how: How,
 ) -> PyResult<Solved> {
+    if let [only] = seen.printed() {
+        how.sheet.sheets = only.sheets.clone();
+    }
     let seen = Arc::new(seen);
-    let (mut all, mut named) = (Vec::new(), Vec::new());
-    let (mut left_out, mut ink, mut panels) = (Vec::new(), Vec::new(), Vec::new());
-    let is_named = cameras.len() > 1;
-    let mut notes = BTreeMap::new();
-    {
-        if let [only] = seen.printed() {
-            how.sheet.sheets = only.sheets.clone();
-        }
-        let reference = seen.reference();
-        panels.extend(how.sheet.panels(&reference).raise(errors::calibration)?);
-        let mut taken: BTreeSet<(usize, String)> = BTreeSet::new();
-        for (index, mut camera) in cameras.into_iter().enumerate() {
-            if is_named
-                && let Some((twice, _)) =
-                    camera.detections.iter().find(|(name, _)| !taken.insert((index, name.clone())))
-            {
-                let what = format!("{}: two images are named {twice}", camera.name);
-                return Err(raised::CalibrationError::new_err(what));
-            }
-            ink.extend(camera.detections.iter().filter_map(|(_, found)| {
-                let ink = found.ink?;
-                Some(if let Seen::Grid(grid) = &*seen { ink.on_print(grid.edge_mm) } else { ink })
-            }));
-            let photographs = camera.detections.iter().map(|(_, found)| found);
-            notes.extend(camera_notes(photographs).map(|notes| (all.len(), notes)));
-            if how.assume_target {
-                assume(&mut camera.detections, reference.targets());
-            }
-            named.extend(camera.detections.iter().flat_map(|(_, found)| found.targets.clone()));
-            let shown = views(&camera.detections, &reference).raise(errors::calibration)?;
-            if let Some(mixed) = &shown.mixed {
-                warn(py, &format!("{}: {mixed}", camera.name))?;
-            }
-            let mut of_camera: Vec<View> = shown.views;
-            let name = is_named.then(|| camera.name.clone());
-            left_out.extend(
-                shown.excluded.into_iter().map(|(_, out)| Excluded { camera: name.clone(), ..out }),
-            );
-            let target = seen.targets().first();
-            how.sheet.put_on(target, &mut of_camera).raise(errors::calibration)?;
-            if of_camera.is_empty() {
-                let what = format!("{}: no image shows the target", camera.name);
-                return Err(raised::CalibrationError::new_err(what));
-            }
-            let known = camera.known.map(Intrinsics::Known);
-            let intrinsics = known.unwrap_or(Intrinsics::Unknown(model.richest()));
-            all.push((camera.name, of_camera, intrinsics));
-        }
+    let stated = how.sheet.panels(&seen.reference()).raise(errors::calibration)?;
+    let (mut input, is_of_many) = (Input::default(), cameras.len() > 1);
+    for camera in cameras {
+        input.add(py, camera, is_of_many, model.richest(), &seen, &how)?;
+    }
+    let Input { mut cameras, named, left_out, ink, notes } = input;
+    // Only `calibrate` has constraints, with one camera.
+    if let [only] = cameras.as_mut_slice() {
+        only.constraints = std::mem::take(&mut how.constraints);
     }
     let print = Print { scale: how.sheet.print_scale, ink: detect::InkEstimate::of_all(&ink) };
-    let stated = panels.clone();
-    let of = seen.clone();
+    let (of, panels) = (seen.clone(), stated.clone());
     let solved = interruptible(py, move |stop| {
-        let mut calibration = Calibration::of(&of.reference(), panels)
-            .named_by(named)
-            .loss(how.loss)
-            .weights(how.weights)
-            .board_shape(how.board_shape)
-            .measure_target(how.measure_target)
-            .refine_panels(how.refine_target)
-            .distances_mm(how.distances_mm)
-            .covariance_of_all(how.covariance_of_all)
-            .hold_out(how.hold_out)
-            .cancelled_by(stop.clone());
-        if let Some(mm) = how.board_accuracy_mm {
-            calibration = calibration.board_accuracy_mm(Some(mm));
+        let calibration = Calibration::of(&of.reference(), panels).named_by(named);
+        let mut calibration = how.applied_to(calibration).cancelled_by(stop.clone());
+        for camera in cameras {
+            calibration = calibration.with(camera);
         }
-        let count = all.len();
-        for (name, views, intrinsics) in all {
-            calibration = calibration.camera(&name, views, intrinsics);
-        }
-        // Only `calibrate` has constraints, with one camera.
-        if count == 1 {
-            calibration.set_constraints(0, how.constraints);
-        }
-        let mut models = vec![Vec::new(); count];
-        for (index, tried) in models.iter_mut().enumerate() {
-            if model.0.is_none() && calibration.cameras()[index].intrinsics.model().is_some() {
-                let (chosen, candidates) = calibration.choose_model(index, &Model::CANDIDATES)?;
-                calibration.set_intrinsics(index, chosen);
-                *tried = candidates;
-            }
-        }
+        let models = model.choose(&mut calibration)?;
         let estimate = calibration.solve()?;
         let diagnoses = calibration.explain(&estimate);
         Ok::<_, CalibrationError>((estimate, diagnoses, models))
@@ -561,7 +444,7 @@ pub fn solve(
     };
     let described: Vec<_> = targets.iter().map(|one| one.target.clone()).collect();
     let poses = estimate.pose_uncertainties(&described);
-    let model = model.name();
+    let (model, file) = (model.name(), None);
     Ok(Solved {
         estimate,
         diagnoses,
@@ -573,6 +456,6 @@ pub fn solve(
         poses,
         model,
         is_rig,
-        file: None,
+        file,
     })
 }

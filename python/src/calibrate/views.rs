@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::pickled::{Part, pickled};
-use super::solving::Solved;
+use super::solved::Solved;
 use crate::boundary::arrays::{self, record};
 use crate::boundary::errors;
 use crate::pickles;

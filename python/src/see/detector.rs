@@ -124,6 +124,20 @@ pub fn size(rows: Option<u32>, cols: Option<u32>) -> PyResult<Option<(u32, u32)>
     }
 }
 
+/// Rejects a maximum number of errors that a family of the targets cannot correct.
+fn check_max_errors(targets: &[Target], max_errors: Option<u32>) -> PyResult<()> {
+    for family in targets.iter().filter_map(|target| target.codes()) {
+        if let Some(limit) = max_errors.filter(|limit| *limit > family.correctable()) {
+            return Err(errors::detection(format!(
+                "max_errors {limit} exceeds the {} cells that {} can correct",
+                family.correctable(),
+                family.name()
+            )));
+        }
+    }
+    Ok(())
+}
+
 #[pymethods]
 impl Detector {
     #[new]
@@ -200,15 +214,7 @@ impl Detector {
                 return Err(wrong("target and grid are mutually exclusive".to_owned()));
             }
             (targets, None) => {
-                for family in targets.iter().filter_map(|target| target.codes()) {
-                    if let Some(limit) = max_errors.filter(|limit| *limit > family.correctable()) {
-                        return Err(wrong(format!(
-                            "max_errors {limit} exceeds the {} cells that {} can correct",
-                            family.correctable(),
-                            family.name()
-                        )));
-                    }
-                }
+                check_max_errors(targets, max_errors)?;
                 let each: Vec<_> = targets.iter().map(|of| of.target()).collect();
                 detect::Detector::for_targets(&each, config).raise(errors::detection)?
             }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use deltille::export::truth;
 use deltille::glam::DVec3;
 use deltille::limits::Limits;
+use deltille::raster::Gray;
 use deltille::synth::{Light, TruthCorner, scene_of_target};
 use deltille_core::quantity::{blur_px, light_gradient, of_full_scale, position_mm};
 use numpy::ndarray::Array2;
@@ -14,7 +15,7 @@ use pyo3::prelude::*;
 use super::camera::Camera;
 use super::pose::Pose;
 use crate::boundary::arrays::{self, number, vector, whole};
-use crate::boundary::errors::{self, Raise, RaiseFile, raised};
+use crate::boundary::errors::{self, Raise, RaiseFile};
 use crate::boundary::interrupt::interruptible;
 use crate::targets::target::Target;
 
@@ -190,15 +191,12 @@ pub fn render<'py>(
     seed: i64,
     dtype: &str,
 ) -> PyResult<(Bound<'py, PyAny>, Truth)> {
-    let wrong = |what: String| raised::TargetError::new_err(what);
     let own = target.clone();
-    let of = own.target();
-    if !of.is_one_scene() {
-        let what = format!(
-            "{} has several separate boards; only a single board or a solid can be rendered",
-            of.name
-        );
-        return Err(wrong(what));
+    let name = own.target().name.to_string();
+    if !own.target().is_one_scene() {
+        return Err(errors::target(format!(
+            "{name} has several separate boards; only a single board or a solid can be rendered"
+        )));
     }
     let camera = camera.0.clone();
     Limits::default().check_pixels(camera.width, camera.height).raise(errors::camera)?;
@@ -214,30 +212,7 @@ pub fn render<'py>(
         .background(grey("background", background)?)
         .gradient(gradient.unwrap_or([0.0; 2]).into())
         .seed(whole("seed", seed, errors::target)?);
-    let place = |name: &str, place| vector(name, place, position_mm::RANGE, errors::target);
-    let look_at = look_at.map(|at| place("look_at", at)).transpose()?;
-    let up = up.map(|up| place("up", up)).transpose()?;
-    let pose = match (pose, eye) {
-        (Some(pose), None) if look_at.or(up).is_none() => *pose,
-        (Some(_), None) => {
-            return Err(wrong(
-                "look_at and up need eye, and cannot be combined with pose".to_owned(),
-            ));
-        }
-        (None, Some(eye)) => {
-            let places = own.all().map(|(_, corner)| corner.target_mm);
-            let middle = places.sum::<DVec3>() / own.all().count().max(1) as f64;
-            Pose::looking_at(place("eye", eye)?, look_at.unwrap_or(middle.to_array()), up)?
-        }
-        (Some(_), Some(_)) => {
-            return Err(wrong("pose and eye are mutually exclusive".to_owned()));
-        }
-        (None, None) => {
-            let what = "pass pose, or eye, the position of the camera in mm";
-            return Err(wrong(what.to_owned()));
-        }
-    };
-    let name = own.target().name.to_string();
+    let pose = pose_of(&own, pose.as_deref().copied(), eye, look_at, up)?;
     let drawn = interruptible(py, move |_| {
         let scene = scene_of_target(own.target())?;
         let image = scene.render(&camera, &pose.0, &light);
@@ -258,23 +233,50 @@ pub fn render<'py>(
         );
         errors::warn(py, &what)?;
     }
-    let shape = (image.height(), image.width());
-    let pixels = image.pixels();
-    let full = "an image has all its pixels";
-    let array = match dtype {
-        "uint8" => {
-            let grey = pixels.iter().map(|v| (v * 255.0 + 0.5) as u8).collect();
-            Array2::from_shape_vec(shape, grey).expect(full).into_pyarray(py).into_any()
+    Ok((array_of(py, &image, dtype)?, Truth { corners, pose, light, target: name }))
+}
+
+/// Returns the given pose, or that of a camera at `eye`.
+fn pose_of(
+    target: &Target,
+    pose: Option<Pose>,
+    eye: Option<&Bound<'_, PyAny>>,
+    look_at: Option<&Bound<'_, PyAny>>,
+    up: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Pose> {
+    let wrong = |what: &str| Err(errors::target(what.to_owned()));
+    let place = |name: &str, place| vector(name, place, position_mm::RANGE, errors::target);
+    let look_at = look_at.map(|at| place("look_at", at)).transpose()?;
+    let up = up.map(|up| place("up", up)).transpose()?;
+    match (pose, eye) {
+        (Some(pose), None) if look_at.or(up).is_none() => Ok(pose),
+        (Some(_), None) => wrong("look_at and up need eye, and cannot be combined with pose"),
+        (None, Some(eye)) => {
+            let places = target.all().map(|(_, corner)| corner.target_mm);
+            let middle = places.sum::<DVec3>() / target.all().count().max(1) as f64;
+            Pose::looking_at(place("eye", eye)?, look_at.unwrap_or(middle.to_array()), up)
         }
-        "uint16" => {
-            let grey = pixels.iter().map(|v| (v * 65535.0 + 0.5) as u16).collect();
-            Array2::from_shape_vec(shape, grey).expect(full).into_pyarray(py).into_any()
-        }
-        "float32" => {
-            let grey = pixels.to_vec();
-            Array2::from_shape_vec(shape, grey).expect(full).into_pyarray(py).into_any()
-        }
-        _ => return Err(wrong(format!("unknown dtype {dtype} (known: uint8, uint16, float32)"))),
-    };
-    Ok((array, Truth { corners, pose, light, target: name }))
+        (Some(_), Some(_)) => wrong("pose and eye are mutually exclusive"),
+        (None, None) => wrong("pass pose, or eye, the position of the camera in mm"),
+    }
+}
+
+/// Returns an image as an array of this type.
+fn array_of<'py>(py: Python<'py>, image: &Gray<f32>, dtype: &str) -> PyResult<Bound<'py, PyAny>> {
+    fn rows<'py, T: numpy::Element>(
+        py: Python<'py>,
+        image: &Gray<f32>,
+        of: fn(f32) -> T,
+    ) -> Bound<'py, PyAny> {
+        let shape = (image.height(), image.width());
+        let values = image.pixels().iter().map(|&v| of(v)).collect();
+        let array = Array2::from_shape_vec(shape, values).expect("an image has all its pixels");
+        array.into_pyarray(py).into_any()
+    }
+    match dtype {
+        "uint8" => Ok(rows(py, image, |v| (v * 255.0 + 0.5) as u8)),
+        "uint16" => Ok(rows(py, image, |v| (v * 65535.0 + 0.5) as u16)),
+        "float32" => Ok(rows(py, image, |v| v)),
+        _ => Err(errors::target(format!("unknown dtype {dtype} (known: uint8, uint16, float32)"))),
+    }
 }
