@@ -115,7 +115,9 @@ def test_calibrations_survive_writing_and_reading(calibration, board, tmp_path):
     assert (again.ids == calibration.ids).all()
     for form, end in [("own", "yaml"), ("opencv", "yaml"), ("ros", "yaml"), ("kalibr", "yaml"), ("colmap", "txt"),
                       ("nerfstudio", "json"), ("mrcal", "cameramodel")]:
-        assert calibration.save(tmp_path / f"{form}.{end}", form).stat().st_size > 50
+        path = calibration.save(tmp_path / f"{form}.{end}", form)
+        if form != "nerfstudio":
+            numpy.testing.assert_allclose(deltille.Camera.load(path).parameters, calibration.camera.parameters)
     assert len(json.loads((tmp_path / "nerfstudio.json").read_text())["frames"]) == 10
     for form in ("own", "opencv", "ros"):
         read = deltille.Camera.load(tmp_path / f"{form}.yaml")

@@ -49,6 +49,14 @@ def test_invalid_cameras_are_rejected(tmp_path):
         deltille.Camera(640, 480, 500).save(tmp_path / "b", "none")
 
 
+def test_one_of_several_cameras_is_named(tmp_path):
+    path = tmp_path / "cameras.txt"
+    path.write_text("1 PINHOLE 640 480 500 500 320 240\n2 SIMPLE_RADIAL 640 480 400 320 240 -0.1\n")
+    assert deltille.Camera.load(f"{path}:2") == deltille.Camera(640, 480, 400, distortion=[-0.1])
+    with pytest.raises(deltille.FileError, match="contains the cameras 1, 2"):
+        deltille.Camera.load(path)
+
+
 def test_poses_are_motions():
     pose = deltille.Pose((0.1, -0.2, 0.3), (10, 20, 30))
     numpy.testing.assert_allclose(pose.rvec, (0.1, -0.2, 0.3))

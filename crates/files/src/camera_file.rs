@@ -7,7 +7,7 @@ use deltille_core::json;
 
 use crate::export::saved::{self, SavedError};
 use crate::export::{calibration, rig, staging};
-use crate::limits::{Limits, MAX_SETTINGS_BYTES, ReadError};
+use crate::limits::{Limits, ReadError};
 
 /// Error of reading a camera.
 #[derive(Debug, thiserror::Error)]
@@ -61,12 +61,14 @@ pub fn read(path: &Path) -> Result<Camera, CameraReadError> {
     read_with_targets(path).map(|file| file.camera)
 }
 
-/// Reads a camera file of this program, ROS or OpenCV, or the camera of a calibration (the .json beside it). Leftovers of
-/// killed runs in its folder are cleaned up first.
+/// Reads a camera file of this program, OpenCV, ROS, Kalibr, COLMAP or mrcal, or the camera of a calibration (the .json beside
+/// it). A name after a colon selects one of several cameras, as in `camchain.yaml:cam1`. Leftovers of killed runs in its
+/// folder are cleaned up first.
 ///
 /// # Errors
 /// Returns an error if the file cannot be read, or does not contain a camera.
 pub fn read_with_targets(path: &Path) -> Result<CameraFile, CameraReadError> {
+    let (path, name) = split(path);
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     staging::settle(folder.unwrap_or(Path::new("."))).map_err(CameraReadError::Settle)?;
     let text = Limits::default().read_text(path)?;
@@ -76,11 +78,18 @@ pub fn read_with_targets(path: &Path) -> Result<CameraFile, CameraReadError> {
             false => Err(CameraReadError::Kind { path: path.to_owned(), schema }),
         };
     }
-    if text.len() > MAX_SETTINGS_BYTES {
-        return Err(ReadError::TooLong { path: path.to_owned(), most: MAX_SETTINGS_BYTES }.into());
-    }
     let yaml = |error| CameraReadError::Yaml { path: path.to_owned(), error };
-    CameraFile::from_yaml(&text).map_err(yaml)
+    CameraFile::named(&text, name).map_err(yaml)
+}
+
+/// Splits the name of a camera from the path of its file. A file whose name contains a colon is no such pair.
+fn split(path: &Path) -> (&Path, Option<&str>) {
+    match path.to_str().and_then(|text| text.rsplit_once(':')) {
+        Some((file, name)) if !path.exists() && Path::new(file).is_file() => {
+            (Path::new(file), Some(name))
+        }
+        _ => (path, None),
+    }
 }
 
 /// The only camera of a calibration.

@@ -145,7 +145,7 @@ impl Camera {
         Self::checked(size_px.into(), [fx, fy], Some([cx, cy]), model, distortion)
     }
 
-    /// Reads a camera file of this package (``.yaml``), of ROS or of OpenCV.
+    /// Reads a camera file of this package (``.yaml``), OpenCV, ROS, Kalibr, COLMAP (``cameras.txt``) or mrcal.
     ///
     /// Parameters
     /// ----------

@@ -233,6 +233,11 @@ fn cameras() {
         &fisheye,
         &two.replace("pinhole", "eucm"),
         &CAMERA.replace("pinhole", "double-sphere").replace("[-0.1, 0.02]", "[-0.2, 0.6]"),
+        "cam0:\n  camera_model: omni\n  intrinsics: [1.2, 500.5, 501, 320, 240]\n  distortion_model: none\n  \
+         distortion_coeffs: []\n  resolution: [640, 480]\n",
+        "1 RADIAL 640 480 500.5 320.5 240.5 -0.1 0.02\n",
+        "{ 'lensmodel': 'LENSMODEL_OPENCV4', 'intrinsics': [ 500.5, 501, 320, 240, -0.1, 0.01, 0.001, 0.002, ], \
+         'imagersize': [ 640, 480 ] }\n",
     ];
     for text in texts {
         assert!(Camera::from_yaml(text).is_ok(), "{text}");

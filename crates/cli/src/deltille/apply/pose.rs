@@ -37,7 +37,7 @@ pub struct Args {
     target: Vec<PathBuf>,
     #[command(flatten)]
     grid: GridArgs,
-    /// Camera file of `deltille calibrate`, ROS or OpenCV
+    /// Camera file of `deltille calibrate`, OpenCV, ROS, Kalibr (FILE:cam0), COLMAP (FILE:1) or mrcal
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
     /// Use --target even if the camera was calibrated with a board with the same tags but a different size

@@ -62,8 +62,8 @@ pub struct Args {
     images: Vec<PathBuf>,
     #[command(flatten)]
     recording: RecordingArgs,
-    /// Camera file of `deltille calibrate`, ROS or OpenCV; with the .json of `deltille calibrate`, the uncertainty of positions in
-    /// the undistorted images is reported
+    /// Camera file of `deltille calibrate`, OpenCV, ROS, Kalibr (FILE:cam0), COLMAP (FILE:1) or mrcal; with the .json of `deltille
+    /// calibrate`, the uncertainty of positions in the undistorted images is reported
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
     #[command(flatten)]

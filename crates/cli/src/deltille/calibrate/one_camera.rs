@@ -44,7 +44,7 @@ pub struct Args {
         Model::choice()
     ))]
     model: Option<ModelChoice>,
-    /// Estimate only poses, with this fixed camera: a file written by this command, ROS or OpenCV
+    /// Estimate only poses, with this fixed camera: a file that `deltille pose --camera` accepts
     #[arg(long, value_name = "CAMERA", conflicts_with_all = ["model", "holdout", "board_shape", "fix", "equal", "prior"])]
     fixed_intrinsics: Option<PathBuf>,
     #[command(flatten)]

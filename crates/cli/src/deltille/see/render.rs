@@ -24,8 +24,8 @@ use deltille_core::words::counted;
 pub struct Args {
     /// Target description: the .json of `deltille board` or `deltille icosahedron`
     target: PathBuf,
-    /// Camera file of `deltille calibrate`, ROS or OpenCV, or a YAML file with width, height,
-    /// focal_px, centre_px, model (such as pinhole or fisheye) and distortion
+    /// Camera file of `deltille calibrate`, OpenCV, ROS, Kalibr (FILE:cam0), COLMAP (FILE:1) or mrcal, or a YAML file with width,
+    /// height, focal_px, centre_px, model (such as pinhole or fisheye) and distortion
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
     /// Pose of the target in the camera frame (x right, y down, z forward): rotation vector in radians and

@@ -384,22 +384,36 @@ mod tests {
         Camera::centred(640, 480, 500.0, lens.with_parameters(&values))
     }
 
+    /// Every model in every format that supports it, except nerfstudio's, which is not read.
     #[test]
-    fn ros_and_opencv_files_read_back_as_the_camera() {
-        for (model, count) in [
-            (Model::Radtan, 4),
-            (Model::Radtan5, 5),
-            (Model::Rational, 8),
-            (Model::ThinPrism, 12),
-            (Model::KannalaBrandt(4), 4),
+    fn files_read_back_as_the_camera() {
+        let mut count = 0;
+        for model in [
+            Model::Radtan,
+            Model::Radtan5,
+            Model::Rational,
+            Model::ThinPrism,
+            Model::KannalaBrandt(4),
+            Model::Eucm,
+            Model::DoubleSphere,
+            Model::SPLINE,
         ] {
-            let camera = camera(model, count);
-            assert_eq!(Camera::from_yaml(&opencv(&camera).unwrap()).unwrap(), camera, "{model}");
-            if model != Model::ThinPrism {
-                let text = ros(&camera, "left: \"1\"").unwrap();
+            let camera = camera(model, model.parameter_count());
+            for text in [
+                opencv(&camera),
+                ros(&camera, "left: \"1\""),
+                kalibr(&[(&camera, Pose::IDENTITY)], &[]),
+                colmap(&[&camera]),
+                mrcal(&camera),
+            ]
+            .into_iter()
+            .flatten()
+            {
                 assert_eq!(Camera::from_yaml(&text).unwrap(), camera, "{text}");
+                count += 1;
             }
         }
+        assert_eq!(count, 22);
     }
 
     #[test]
