@@ -922,7 +922,7 @@ class Rectification:
     def __reduce__(self) -> tuple[Any, ...]: ...
 
 def undistort(
-    camera: Camera,
+    camera: CalibratedCamera | Camera,
     *,
     field: Literal["inside", "whole"] | float = "inside",
     focal_px: float | None = None,
@@ -1170,7 +1170,7 @@ def calibrate(
     target: Target | Sequence[Target] | None = None,
     model: str = "radtan",
     *,
-    camera: Camera | None = None,
+    camera: CalibratedCamera | Camera | None = None,
     grid: Tiling | None = None,
     rows: int | None = None,
     cols: int | None = None,
@@ -1196,7 +1196,7 @@ def rig(
     target: Target | Sequence[Target] | None = None,
     model: str = "radtan",
     *,
-    known: Mapping[str, Camera] | None = None,
+    known: Mapping[str, CalibratedCamera | Camera] | None = None,
     refine_target: bool = False,
     hold_out: int | None = None,
     loss: Loss = "huber",
@@ -1244,7 +1244,7 @@ def next_view(
     model: str = "radtan",
     *,
     size_px: tuple[int, int] | None = None,
-    camera: Camera | None = None,
+    camera: CalibratedCamera | Camera | None = None,
     nearest_mm: float | None = None,
     farthest_mm: float | None = None,
     avoid: Sequence[NextView] | None = None,
@@ -1534,7 +1534,7 @@ class Located:
 
 def pose(
     detection: Detection,
-    camera: Camera,
+    camera: CalibratedCamera | Camera,
     target: Target | None = None,
     *,
     print_scale: ArrayLike | None = None,
@@ -1568,7 +1568,7 @@ class Truth:
 
 def render(
     target: Target,
-    camera: Camera,
+    camera: CalibratedCamera | Camera,
     pose: Pose | None = None,
     *,
     eye: ArrayLike | None = None,

@@ -13,7 +13,7 @@ use super::solved::Solved;
 use super::views::{View, residual_arrays};
 use crate::boundary::arrays::{self, distance, record};
 use crate::boundary::errors::{raised, unlocked};
-use crate::see::camera::Camera;
+use crate::see::camera::{AnyCamera, Camera};
 use crate::see::pose::Pose;
 
 /// A calibrated camera.
@@ -67,6 +67,17 @@ fn source(name: &str) -> PyResult<Source> {
         _ => Err(raised::CalibrationError::new_err(format!(
             "unknown source {name} (known: noise, observed)"
         ))),
+    }
+}
+
+impl<'a, 'py> FromPyObject<'a, 'py> for AnyCamera {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(found) = given.cast::<CalibratedCamera>() {
+            return Ok(Self(found.get().estimate().camera.clone()));
+        }
+        Ok(Self(given.cast::<Camera>()?.get().0.clone()))
     }
 }
 

@@ -20,7 +20,7 @@ use super::solved::Solved;
 use super::solving::print_scale_of;
 use crate::boundary::arrays::{self, distance};
 use crate::boundary::errors::{self, Raise, raised, unlocked};
-use crate::see::camera::Camera;
+use crate::see::camera::{AnyCamera, Camera};
 use crate::see::detection::Detection;
 use crate::see::pose::Pose;
 use crate::targets::target::{Target, Targets};
@@ -451,7 +451,7 @@ impl Located {
 /// ----------
 /// detection : Detection
 ///     The detections in the image.
-/// camera : Camera
+/// camera : Camera or CalibratedCamera
 ///     The camera that took it.
 /// target : Target, optional
 ///     The target; defaults to that of the detection.
@@ -470,7 +470,7 @@ impl Located {
 pub fn pose_of(
     py: Python<'_>,
     detection: PyRef<'_, Detection>,
-    camera: PyRef<'_, Camera>,
+    camera: AnyCamera,
     target: Option<Targets>,
     print_scale: Option<&Bound<'_, PyAny>>,
     assume_target: bool,
@@ -492,7 +492,7 @@ pub fn pose_of(
     for grid in &detection.found.grids {
         reference.check_labels(&detection.found, grid).raise(errors::calibration)?;
     }
-    let (camera, target) = (camera.clone(), target.clone());
+    let (camera, target) = (Camera(camera.0), target.clone());
     Asked { detection, camera, target, print_scale }.located(py)
 }
 

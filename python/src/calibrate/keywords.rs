@@ -14,7 +14,7 @@ use super::calibration::{Calibration, Rig, calibration};
 use super::solving::{How, ModelChoice, OneCamera, Seen, Texts, constraints, named, solve};
 use crate::boundary::errors::{self, RaiseFile, raised};
 use crate::see::arguments::Results;
-use crate::see::camera::Camera;
+use crate::see::camera::AnyCamera;
 use crate::see::detection::Detection;
 use crate::see::detector::sides;
 use crate::targets::target::Targets;
@@ -31,7 +31,7 @@ use crate::targets::target::Targets;
 ///     ``"radtan"``, ``"radtan5"``, ``"rational"``, ``"thin-prism"``, ``"kannala-brandt"``, ``"eucm"``,
 ///     ``"double-sphere"``, ``"pupil"``, ``"spline"``, or ``"auto"``, which selects the model with the lowest error on
 ///     held-out views. Names of other programs work too: OpenCV's ``"fisheye"`` is ``"kannala-brandt"``.
-/// camera : Camera, optional
+/// camera : Camera or CalibratedCamera, optional
 ///     A known camera, which is kept fixed; only the poses are estimated.
 /// grid : str, optional
 ///     Tiling of an untagged board, instead of a target: ``"deltille"`` or ``"checker"``.
@@ -92,7 +92,7 @@ pub fn calibrate(
     detections: Results<'_>,
     target: Option<Targets>,
     model: &str,
-    camera: Option<PyRef<'_, Camera>>,
+    camera: Option<AnyCamera>,
     grid: Option<&str>,
     rows: Option<i64>,
     cols: Option<i64>,
@@ -130,7 +130,7 @@ pub fn calibrate(
     let model = ModelChoice::of(model)?;
     let names = detections.names(names);
     let detections = named(py, &detections.all, names)?;
-    let known = camera.map(|camera| camera.0.clone());
+    let known = camera.map(|camera| camera.0);
     let one = OneCamera { name: "camera".to_owned(), detections, known };
     let solved = solve(py, seen, vec![one], false, model, how)?;
     Py::new(py, calibration(Arc::new(solved)))
@@ -153,7 +153,7 @@ pub fn of_detections(detections: &[PyRef<'_, Detection>], is_grid: bool) -> Opti
 ///     The target, or several that do not move relative to each other; defaults to those of the detections.
 /// model : str, optional
 ///     See :func:`calibrate`.
-/// known : dict of str to Camera, optional
+/// known : dict of str to Camera or CalibratedCamera, optional
 ///     Known cameras, which are kept fixed.
 /// refine_target : bool, optional
 ///     Estimate the poses of the panels on the target, too.
@@ -180,7 +180,7 @@ pub fn rig(
     cameras: &Bound<'_, PyMapping>,
     target: Option<Targets>,
     model: &str,
-    known: Option<BTreeMap<String, PyRef<'_, Camera>>>,
+    known: Option<BTreeMap<String, AnyCamera>>,
     refine_target: bool,
     hold_out: Option<i64>,
     loss: &str,
@@ -212,7 +212,7 @@ pub fn rig(
             .map_err(|error| raised::CalibrationError::new_err(errors::one_line(&error)))?;
         let detections: Results<'_> = detections.extract()?;
         target = target.or_else(|| of_detections(&detections.all, false));
-        let known = known.remove(&name).map(|camera| camera.0.clone());
+        let known = known.remove(&name).map(|camera| camera.0);
         let detections = named(py, &detections.all, None)?;
         let is_same = |one: &deltille::detect::Detection, other: &deltille::detect::Detection| {
             !one.grids.is_empty() && one.grids == other.grids

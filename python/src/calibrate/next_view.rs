@@ -11,7 +11,7 @@ use super::solving::{ModelChoice, Seen, assume, named};
 use crate::boundary::arrays::{self, number, whole};
 use crate::boundary::errors::{self, Raise, raised, unlocked};
 use crate::see::arguments::Results;
-use crate::see::camera::Camera;
+use crate::see::camera::AnyCamera;
 use crate::see::pose::Pose;
 use crate::targets::target::Targets;
 
@@ -135,7 +135,7 @@ impl NextView {
 ///     See :func:`calibrate`; ``"auto"`` and ``"spline"`` are not supported.
 /// size_px : (int, int), optional
 ///     Width and height of the images; required before the first image unless ``camera`` is given.
-/// camera : Camera, optional
+/// camera : Camera or CalibratedCamera, optional
 ///     Initial guess of the camera; all its parameters are estimated.
 /// nearest_mm, farthest_mm : float, optional
 ///     Range of distances at which the board can be held and is in focus.
@@ -162,7 +162,7 @@ pub fn next_view(
     target: Option<Targets>,
     model: &str,
     size_px: Option<(i64, i64)>,
-    camera: Option<PyRef<'_, Camera>>,
+    camera: Option<AnyCamera>,
     nearest_mm: Option<f64>,
     farthest_mm: Option<f64>,
     avoid: Option<Vec<PyRef<'_, NextView>>>,

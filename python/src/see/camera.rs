@@ -150,6 +150,7 @@ impl Camera {
     /// Parameters
     /// ----------
     /// path : path-like
+    ///     The file; one of several cameras is chosen by its name, as in ``camchain.yaml:cam1`` or ``cameras.txt:2``.
     ///
     /// Returns
     /// -------
@@ -356,6 +357,9 @@ impl Camera {
         Ok((slf.get_type().getattr("from_yaml")?, (slf.get().to_yaml(),)))
     }
 }
+
+/// A camera as an argument: a [`Camera`], or that of a calibration.
+pub struct AnyCamera(pub camera::Camera);
 
 impl Camera {
     /// Makes a camera from numbers in their ranges; the principal point defaults to the centre of the image.

@@ -12,7 +12,7 @@ use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 
-use super::camera::Camera;
+use super::camera::AnyCamera;
 use super::pose::Pose;
 use crate::boundary::arrays::{self, number, vector, whole};
 use crate::boundary::errors::{self, Raise, RaiseFile};
@@ -142,7 +142,7 @@ impl From<truth::Truth> for Truth {
 /// ----------
 /// target : Target
 ///     A board or a solid. A board faces the side of z > 0; ChArUco boards and circle grids that of z < 0.
-/// camera : Camera
+/// camera : Camera or CalibratedCamera
 /// pose : Pose, optional
 ///     Camera from target.
 /// eye : sequence of 3 floats, optional
@@ -177,7 +177,7 @@ impl From<truth::Truth> for Truth {
 pub fn render<'py>(
     py: Python<'py>,
     target: PyRef<'_, Target>,
-    camera: PyRef<'_, Camera>,
+    camera: AnyCamera,
     pose: Option<PyRef<'_, Pose>>,
     eye: Option<&Bound<'_, PyAny>>,
     look_at: Option<&Bound<'_, PyAny>>,
@@ -198,7 +198,7 @@ pub fn render<'py>(
             "{name} has several separate boards; only a single board or a solid can be rendered"
         )));
     }
-    let camera = camera.0.clone();
+    let camera = camera.0;
     Limits::default().check_pixels(camera.width, camera.height).raise(errors::camera)?;
     let grey = |name: &str, value| number(name, value, of_full_scale::RANGE, errors::target);
     let gradient = gradient

@@ -14,7 +14,7 @@ use numpy::{
 };
 use pyo3::prelude::*;
 
-use super::camera::Camera;
+use super::camera::{AnyCamera, Camera};
 use crate::boundary::arrays::{self, number, shape_in_words, whole};
 use crate::boundary::errors::{self, Raise, raised, unlocked};
 use crate::calibrate::calibration::Rig;
@@ -240,7 +240,7 @@ impl View {
 ///
 /// Parameters
 /// ----------
-/// camera : Camera
+/// camera : Camera or CalibratedCamera
 /// field : str or float, optional
 ///     Field of view: ``"inside"``, as large as possible without black pixels; ``"whole"``, everything that the camera sees,
 ///     up to 150°; or a horizontal angle, rad.
@@ -271,20 +271,17 @@ impl View {
     distance_mm = None), text_signature = "(camera, *, field='inside', focal_px=None, size_px=None, distance_mm=None)")]
 pub fn undistort(
     py: Python<'_>,
-    camera: &Camera,
+    camera: AnyCamera,
     field: FieldOfView,
     focal_px: Option<f64>,
     size_px: Option<[i64; 2]>,
     distance_mm: Option<f64>,
 ) -> PyResult<Undistortion> {
-    let view = View::of(&camera.0, field, focal_px, size_px, distance_mm)?;
+    let camera = camera.0;
+    let view = View::of(&camera, field, focal_px, size_px, distance_mm)?;
     let made = unlocked(py, || {
-        let made = camera::Undistortion::new(&camera.0, view.size_px, view.field)?;
-        Ok::<_, camera::UndistortionError>(Undistortion::of(
-            camera.0.clone(),
-            made,
-            view.distance_mm,
-        ))
+        let made = camera::Undistortion::new(&camera, view.size_px, view.field)?;
+        Ok::<_, camera::UndistortionError>(Undistortion::of(camera, made, view.distance_mm))
     })?;
     made.raise(errors::camera)
 }
