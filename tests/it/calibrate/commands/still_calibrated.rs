@@ -117,6 +117,14 @@ fn a_check_answers_unchanged_changed_or_cannot_tell() {
         assert_eq!(found["missing"][0]["kind"], kind, "{text}");
         assert!(text.starts_with("cannot tell: "), "{text}");
     }
+    // The calibration with the uncertainties is named only if it is there.
+    std::fs::copy(at.join("camera.yaml"), at.join("alone.yaml")).unwrap();
+    for (camera, named) in [("camera.yaml", "use camera.json"), ("alone.yaml", "use the .json")] {
+        let said = output(at, &format!("check {camera} same --target board.json"));
+        let [out, err] = [said.stdout, said.stderr].map(|text| String::from_utf8(text).unwrap());
+        assert!(out.contains(&format!("no uncertainties: {named}")), "{out}");
+        assert_eq!((out + &err).matches("uncertainties").count(), 1, "{err}");
+    }
 }
 
 #[test]

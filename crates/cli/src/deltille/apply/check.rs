@@ -1,16 +1,16 @@
 //! `deltille check`.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use super::new_views::NewViewsArgs;
+use super::new_views::{Known, NewViewsArgs};
 use crate::interrupt;
-use crate::output::{self, Overwrite, log, report};
+use crate::output::{self, Overwrite, report};
 use crate::run::{FAILED, UNDECIDED};
 use deltille::calibrate::{Answer, Check, Missing, QuantityTest, Suspect};
-use deltille::export::check;
 use deltille::export::kind::Kind;
+use deltille::export::{check, saved};
 use deltille_core::words::{counted, p_value, places};
 
 /// Arguments of `deltille check`.
@@ -33,17 +33,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         args.overwrite.check(path, &Kind::of_schema(check::SCHEMA))?;
     }
     let known = args.views.known()?;
-    // A camera file without uncertainties is accepted, because the answer is `cannot tell`.
-    if let [missing] = known.calibration.check(&known.before).missing.as_slice()
-        && !matches!(missing, Missing::Views { .. })
-    {
-        log!("note: only the image size can be checked: {missing}");
-    }
+    // A camera file without uncertainties is accepted, because its image size can be checked.
     let found = args.views.views(&known)?.check(&known.before);
     if let Some(path) = &path {
         output::write(path, check::write(&found).as_bytes(), args.overwrite)?;
     }
-    output::print(&describe(&found))?;
+    output::print(&describe(&found, with_uncertainties(args.views.camera(), &known, &found)))?;
     if let Some(path) = &path {
         report!("{}", output::wrote(path));
     }
@@ -57,8 +52,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     })
 }
 
-/// Describes the answer, one statement per line.
-fn describe(found: &Check) -> String {
+/// The calibration beside a camera file, if the check lacks its uncertainties.
+fn with_uncertainties(camera: &Path, known: &Known, found: &Check) -> Option<PathBuf> {
+    let beside = camera.with_extension("json");
+    let is_lacking = found.missing == [Missing::Covariance];
+    let text = is_lacking.then(|| known.limits.read_text(&beside).ok()).flatten()?;
+    let calibration = saved::read_without_target(&text).ok()?;
+    (known.calibration.check(&calibration).missing != found.missing).then_some(beside)
+}
+
+/// Describes the answer, one statement per line; `beside` is the calibration whose uncertainties are missing.
+fn describe(found: &Check, beside: Option<PathBuf>) -> String {
     let names = |of: &[Suspect], between: &str| {
         of.iter().map(ToString::to_string).collect::<Vec<_>>().join(between)
     };
@@ -82,7 +86,13 @@ fn describe(found: &Check) -> String {
                 format!("changed: {}{or}: {of}\n", names(&found.changed, " and "))
             }
         },
-        _ => found.missing.iter().map(|why| format!("cannot tell: {why}\n")).collect(),
+        _ => match beside {
+            Some(path) => format!(
+                "cannot tell: the camera file has no uncertainties: use {}, which has them\n",
+                path.display()
+            ),
+            None => found.missing.iter().map(|why| format!("cannot tell: {why}\n")).collect(),
+        },
     };
     if let Some([a, b]) = &found.exchanged {
         // Writing to a String cannot fail.
