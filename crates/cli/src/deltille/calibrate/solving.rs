@@ -166,7 +166,9 @@ impl ModelChoice {
             {
                 error.into()
             }
-            CalibrationError::WrongConstraints { .. } => error.into(),
+            CalibrationError::WrongConstraints { .. } | CalibrationError::Parallel { .. } => {
+                error.into()
+            }
             CalibrationError::TooFewViews { .. } => anyhow!(
                 "{} are too few for --model auto, which tests each model on a third of them: name a model, such as radtan",
                 counted(calibration.cameras()[camera].views.len(), "view")

@@ -106,7 +106,7 @@ impl Report<'_> {
     /// Returns the warnings about the number of views and their tilts, which are no diagnoses of the solution.
     pub fn view_warnings(&self) -> Vec<String> {
         let of_camera = |camera: &CameraEstimate| {
-            let found = number_and_tilts(self, camera, &Survey::new(camera)).into_iter();
+            let found = number_and_tilts(self, &Survey::new(camera)).into_iter();
             let warnings = found.filter(|piece| piece.weight == Weight::Warning);
             warnings.map(|piece| of_camera(self, camera, piece.text)).collect::<Vec<_>>()
         };
@@ -179,7 +179,7 @@ fn views(
     survey: &Survey,
     add: &mut impl FnMut(Weight, String),
 ) {
-    for Advice { weight, text } in number_and_tilts(report, camera, survey) {
+    for Advice { weight, text } in number_and_tilts(report, survey) {
         add(weight, text);
     }
     left_out(report, add, |out| match &out.camera {

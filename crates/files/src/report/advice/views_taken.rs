@@ -26,21 +26,11 @@ const COVERED: f64 = 0.75;
 /// Beyond it, distortion is extrapolated, and polynomials diverge.
 const REACH: f64 = 0.85;
 
-/// Advice on the number of views, and on the tilts of a planar target in them.
-pub(super) fn number_and_tilts(
-    report: &Report,
-    camera: &CameraEstimate,
-    survey: &Survey,
-) -> Vec<Advice> {
+/// Advice on the tilts of a planar target in the views, and on their number.
+pub(super) fn number_and_tilts(report: &Report, survey: &Survey) -> Vec<Advice> {
     let mut found = Vec::new();
     let mut add = |weight, text| found.push(Advice { weight, text });
-    let count = camera.views.len();
-    if count < VIEWS {
-        add(
-            Weight::Warning,
-            format!("Only {}: take at least {VIEWS}, preferably 20 to 50.", counted(count, "view")),
-        );
-    }
+    let count = survey.views.len();
     if survey.planar {
         let tilted = survey.views.iter().filter(|view| view.tilt_rad > Some(TILTED_RAD));
         let directions = tilted.clone().filter_map(|view| view.tilt_direction_rad);
@@ -48,17 +38,18 @@ pub(super) fn number_and_tilts(
         let doubled: DVec2 = directions.map(|at| DVec2::from_angle(2.0 * at)).sum();
         let tilted = tilted.count();
         let across = (tilted as f64 - doubled.length()) / 2.0;
-        if tilted < TILTED_VIEWS {
+        // If all of few views are tilted, their number is the only cause.
+        if tilted < TILTED_VIEWS.min(count) {
+            let few = match tilted {
+                0 => "No view is".to_owned(),
+                1 => "Only 1 view is".to_owned(),
+                _ => format!("Only {tilted} views are"),
+            };
             add(
                 Weight::Warning,
                 format!(
-                    "Only {} tilted by more than 20°, so focal length and distance are hard to separate. Tilt the {} by \
+                    "{few} tilted by more than 20°, so focal length and distance are hard to separate. Tilt the {} by \
                      30° to 50° in all four directions.",
-                    if tilted == 1 {
-                        "1 view is".to_owned()
-                    } else {
-                        format!("{tilted} views are")
-                    },
                     report.target_noun()
                 ),
             );
@@ -76,6 +67,12 @@ pub(super) fn number_and_tilts(
                 format!("{tilted} of {count} views are tilted by more than 20°, about both axes.");
             add(Weight::Good, text);
         }
+    }
+    if count < VIEWS {
+        add(
+            Weight::Warning,
+            format!("Only {}: take at least {VIEWS}, preferably 20 to 50.", counted(count, "view")),
+        );
     }
     found
 }
@@ -139,11 +136,35 @@ mod tests {
                 distance_mm: 500.0,
             };
             survey.views = directions.iter().map(view).collect();
-            let advice = number_and_tilts(&report, &camera, &survey);
+            let advice = number_and_tilts(&report, &survey);
             advice.iter().any(|piece| piece.text.contains("about the same axis"))
         };
         assert!(is_one_axis(&[0.0, 0.1, PI, PI - 0.1, -0.1]));
         assert!(!is_one_axis(&[0.0, FRAC_PI_2, PI, -FRAC_PI_2]));
         assert!(!is_one_axis(&[0.0, 0.0, 0.0, FRAC_PI_2]));
+    }
+
+    #[test]
+    fn few_parallel_views_have_one_first_cause() {
+        let camera =
+            CameraEstimate::given("", Camera::centred(640, 480, 500.0, Model::Radtan.lens()));
+        let estimate = Estimate::default();
+        let warnings = |tilt_rad: f64| {
+            let mut survey = Survey::new(&camera);
+            survey.planar = true;
+            let view = |direction: f64| SurveyedView {
+                tilt_rad: Some(tilt_rad),
+                tilt_direction_rad: Some(direction),
+                distance_mm: 500.0,
+            };
+            survey.views = [0.0, FRAC_PI_2, PI].map(view).to_vec();
+            let advice = number_and_tilts(&Report::new("", &estimate), &survey).into_iter();
+            let of_weight = advice.filter(|piece| piece.weight == Weight::Warning);
+            of_weight.map(|piece| piece.text).collect::<Vec<_>>()
+        };
+        let parallel = warnings(0.1);
+        assert!(parallel[0].starts_with("No view is tilted"), "{parallel:?}");
+        let tilted = warnings(0.6);
+        assert!(tilted.len() == 1 && tilted[0].starts_with("Only 3 views:"), "{tilted:?}");
     }
 }
