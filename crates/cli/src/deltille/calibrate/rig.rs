@@ -77,7 +77,8 @@ pub struct Args {
     /// Camera and the folder of its photographs, for thumbnails in the report
     #[arg(long, value_name = "NAME=FOLDER", value_parser = named, requires = "report")]
     images: Vec<(String, PathBuf)>,
-    /// Output formats in addition to rig.json and <camera>.yaml, separated by commas
+    /// Output formats in addition to rig.json and <camera>.yaml, separated by commas. For stereo in ROS and OpenCV, `deltille
+    /// rectify` writes R and P of both cameras
     #[arg(long, value_delimiter = ',', value_parser = format(RIG_FORMATS))]
     format: Vec<&'static RigFormat>,
     /// Output folder for rig.json, <camera>.yaml and the refined target; or another name of rig.json, such as stereo.json
