@@ -99,7 +99,7 @@ pub fn run(grid: GridKind, mut args: Args) -> anyhow::Result<ExitCode> {
     let (meshes, texture) = meshes.files(target)?;
     files.extend(meshes);
     files.extend(laser.files(&printing)?);
-    let description = summary(&printing) + &texture;
+    let description = summary(&printing) + &texture + &laser.order();
     let delivered = args.delivery.deliver(&printing, &files, &description)?;
     template.map_or(Ok(()), |template| template.write())?;
     Ok(delivered)

@@ -197,7 +197,7 @@ fn run_with(
     files.extend(textured);
     files.extend(settings.laser.files(&printing)?);
     files.extend(pages(&settings, &printing)?);
-    let description = summary(&printing, &spec)? + &texture;
+    let description = summary(&printing, &spec)? + &texture + &settings.laser.order();
     let delivered = args.delivery.deliver(&printing, &files, &description)?;
     template.map_or(Ok(()), |template| template.write())?;
     Ok(delivered)

@@ -107,6 +107,22 @@ impl Laser {
         refuse_idle(&[("--kerf", self.kerf.is_some(), self.is_any(), needed)])
     }
 
+    /// How to order the drawings, as a line after the summary; empty without any.
+    pub fn order(&self) -> String {
+        let has = |format: &LaserFormat| self.laser.contains(format);
+        let (fill, cut) = match (has(&LaserFormat::Dxf), has(&LaserFormat::Svg)) {
+            (true, true) => ("layer ENGRAVE (SVG: black)", "layer CUT (red)"),
+            (true, false) => ("layer ENGRAVE", "layer CUT"),
+            (false, true) => ("black", "red"),
+            (false, false) => return String::new(),
+        };
+        let kerf = match &self.kerf {
+            Some(kerf) => format!("a kerf of {kerf} is compensated, so set none"),
+            None => "no kerf is compensated".to_owned(),
+        };
+        format!("\nlaser: engrave {fill} as fill, then cut {cut}, in mm at actual size; {kerf}")
+    }
+
     /// Returns the requested drawings.
     pub fn files(&self, printing: &Printing) -> anyhow::Result<Vec<File>> {
         let mut making = Making::default();
