@@ -126,7 +126,9 @@ pub fn check_writable(option: &str, path: &Path) -> anyhow::Result<()> {
         .find(|folder| folder.exists());
     if let Some(folder) = nearest {
         ensure!(folder.is_dir(), "{}: {} is not a folder", context(), folder.display());
-        tempfile::tempfile_in(folder).with_context(context)?;
+        let trial = tempfile::tempfile_in(folder);
+        // The error of the system would show the temporary path.
+        trial.map_err(|error| std::io::Error::from(error.kind())).with_context(context)?;
     }
     Ok(())
 }

@@ -146,7 +146,7 @@ impl<'a> Staged<'a> {
     pub fn new(folder: &'a Path, files: &'a [File], overwrite: Overwrite) -> anyhow::Result<Self> {
         check_places(folder, files, overwrite)?;
         interrupt::set_status("nothing was written");
-        let staging = Staging::new(folder).with_context(|| cannot_write_to(folder))?;
+        let staging = Staging::new(folder).with_context(|| cannot_write(folder, files))?;
         let staged = staging.files();
         let bar = progress::bar(files.len() as u64, "files");
         let written = files.iter().try_for_each(|file| {
@@ -180,15 +180,17 @@ impl<'a> Staged<'a> {
         if replaced.is_empty() {
             replaced.extend(textures_replaced(folder, &staged, &names));
         }
-        staging.commit().with_context(|| cannot_write_to(folder))?;
+        staging.commit().with_context(|| cannot_write(folder, files))?;
         interrupt::set_status("the files are complete, but not all were verified");
         replaced.iter().for_each(|line| log!("{line}"));
         Ok(files.iter().map(|file| folder.join(&file.name)).collect())
     }
 }
 
-fn cannot_write_to(folder: &Path) -> String {
-    format!("-o: cannot write to {}", folder.display())
+/// Names the first of the files, because a folder alone may not be what the user typed.
+fn cannot_write(folder: &Path, files: &[File]) -> String {
+    let first = files.first().map_or(folder.to_owned(), |file| folder.join(&file.name));
+    format!("-o: cannot write {}", first.display())
 }
 
 fn check_interrupt() -> anyhow::Result<()> {

@@ -69,8 +69,7 @@ struct Filled {
 impl Filled {
     fn new(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<Self> {
         Self::written(path, fill).map_err(|error| match error.to_string().contains(PREFIX) {
-            // The user does not know the temporary name.
-            true => io::Error::new(error.kind(), io::Error::from(error.kind()).to_string()),
+            true => without_path(&error),
             false => error,
         })
     }
@@ -96,6 +95,11 @@ impl Filled {
         sync_folder(folder_of(&self.path));
         Ok(())
     }
+}
+
+/// An error without the path of a temporary file, which the user does not know.
+fn without_path(error: &io::Error) -> io::Error {
+    error.kind().into()
 }
 
 fn folder_of(path: &Path) -> &Path {
@@ -187,7 +191,8 @@ pub(in crate::export) fn remove(path: &Path) {
 pub(in crate::export) fn temporary_folder(
     folder: &Path,
 ) -> io::Result<(tempfile::TempDir, Option<File>)> {
-    let made = tempfile::Builder::new().prefix(PREFIX).rand_bytes(RANDOM).tempdir_in(folder)?;
+    let made = tempfile::Builder::new().prefix(PREFIX).rand_bytes(RANDOM).tempdir_in(folder);
+    let made = made.map_err(|error| without_path(&error))?;
     let lock = lock(made.path());
     Ok((made, lock))
 }
@@ -289,5 +294,15 @@ mod tests {
         let path = folder.path().join("nowhere/a.txt");
         let message = write(&path, |_| Ok(())).unwrap_err().to_string();
         assert!(message.contains("nowhere is not a folder"), "{message}");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn errors_do_not_name_temporary_files() {
+        let folder = Path::new("/proc");
+        let of_set = temporary_folder(folder).unwrap_err().to_string();
+        let of_file = write(&folder.join("a.json"), |_| Ok(())).unwrap_err().to_string();
+        assert!(of_file.starts_with("cannot write /proc/a.json: "), "{of_file}");
+        assert!(!(of_set + &of_file).contains(PREFIX));
     }
 }
