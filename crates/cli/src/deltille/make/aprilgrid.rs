@@ -85,5 +85,5 @@ pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
         tag_range(family.map_or("", |family| family.name()), spec.first_id, last),
         page(&printing)
     );
-    args.printing.delivery.deliver(&printing, &files, &summary)
+    args.printing.deliver(&printing, &files, &summary)
 }

@@ -76,5 +76,5 @@ pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
         tag_range(&spec.dictionary, spec.first_id, last),
         page(&printing)
     );
-    args.printing.delivery.deliver(&printing, &files, &summary)
+    args.printing.deliver(&printing, &files, &summary)
 }

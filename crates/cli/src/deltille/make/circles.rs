@@ -52,5 +52,5 @@ pub fn run(mut args: Args) -> anyhow::Result<ExitCode> {
         spec.diameter_mm,
         page(&printing)
     );
-    args.printing.delivery.deliver(&printing, &files, &summary)
+    args.printing.deliver(&printing, &files, &summary)
 }

@@ -1,6 +1,7 @@
 //! Paper and file options of all targets with a single panel.
 
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 use anyhow::{Context, bail};
 
@@ -59,7 +60,7 @@ pub struct PrintingArgs {
     #[arg(long, help_heading = OUTPUT, value_parser = name)]
     name: Option<String>,
     #[command(flatten)]
-    pub delivery: Delivery,
+    delivery: Delivery,
     #[command(flatten)]
     finishing: Finishing,
     #[command(flatten)]
@@ -128,6 +129,16 @@ impl PrintingArgs {
         }
         files.extend(self.laser.files(printing)?);
         Ok(files)
+    }
+
+    /// Writes and verifies the files, and reports them with the summary and how to order drawings for a laser.
+    pub fn deliver(
+        &self,
+        printing: &layout::Printing,
+        files: &[File],
+        summary: &str,
+    ) -> anyhow::Result<ExitCode> {
+        self.delivery.deliver(printing, files, &(summary.to_owned() + &self.laser.order()))
     }
 }
 
