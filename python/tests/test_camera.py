@@ -104,3 +104,24 @@ def test_an_unnamed_image_is_named_in_the_reason_without_a_pose(board, camera):
     found = deltille.Detector(board).detect(numpy.zeros((960, 1280), numpy.uint8))
     why = deltille.pose(found, camera).why
     assert why and why[0].isalpha(), why
+
+
+@pytest.mark.parametrize(
+    ("model", "parameters"),
+    [("SIMPLE_PINHOLE", [400, 320.5, 240.2]), ("PINHOLE", [400, 410, 320.5, 240.2]),
+     ("SIMPLE_RADIAL", [400, 320.5, 240.2, -0.1]), ("RADIAL", [400, 320.5, 240.2, -0.1, 0.02]),
+     ("OPENCV", [400, 410, 320.5, 240.2, -0.1, 0.02, 0.003, -0.002]),
+     ("FULL_OPENCV", [400, 410, 320.5, 240.2, -0.1, 0.02, 0.003, -0.002, 0.01, 0.02, -0.01, 0.003]),
+     ("SIMPLE_RADIAL_FISHEYE", [400, 320.5, 240.2, -0.05]), ("RADIAL_FISHEYE", [400, 320.5, 240.2, -0.05, 0.01]),
+     ("OPENCV_FISHEYE", [400, 410, 320.5, 240.2, -0.05, 0.01, 0.002, -0.001]),
+     ("EUCM", [400, 410, 320.5, 240.2, 0.6, 1.2])],
+)
+def test_cameras_of_colmap_image_points_as_colmap_does(model, parameters, tmp_path):
+    """COLMAP has the centre of the first pixel at (0.5, 0.5)."""
+    pycolmap = pytest.importorskip("pycolmap")
+    original = pycolmap.Camera(model=model, width=640, height=480, params=parameters)
+    file = tmp_path / "cameras.txt"
+    file.write_text(f"# Camera list\n1 {model} 640 480 {' '.join(map(str, parameters))}\n")
+    points = numpy.column_stack([numpy.random.default_rng(5).uniform(-0.5, 0.5, (50, 2)), numpy.ones(50)])
+    expected = [original.img_from_cam(point) - 0.5 for point in points]
+    numpy.testing.assert_allclose(deltille.Camera.load(file).project(points), expected, atol=1e-9)
