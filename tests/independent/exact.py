@@ -132,6 +132,7 @@ class Shot:
     noise: float = 0.005
     tone: str = "linear"
     mosaic: bool = False
+    lamp: object = None  # light on the board at positions x, y in the image, relative; a function of these and a generator
 
     def of(self, board, seed):
         """An 8-bit image, and the corners in it by id."""
@@ -153,6 +154,9 @@ class Shot:
         size = [self.height * FINE, self.width * FINE]
         dark, white = (covered(FINE * project(np.concatenate(part)), *size) for part in (board.dark, board.white))
         light = self.white + (self.black - self.white) * (dark - white)
+        if self.lamp:
+            x, y = ((np.arange(side) + 0.5) / FINE - 0.5 for side in (size[1], size[0]))
+            light *= self.lamp(x, y[:, None], rng)
         if self.blur_px:
             light = cv2.GaussianBlur(light, (0, 0), self.blur_px * FINE, borderType=cv2.BORDER_REPLICATE)
         light = light.reshape(self.height, FINE, self.width, FINE).mean((1, 3))

@@ -225,6 +225,8 @@ fn fill<const K: usize, const C: usize, const JOINT: bool, const CORRELATED: usi
     let by_ink: [f32; K] = std::array::from_fn(|k| look.by_ink[k] as f32);
     let (amplitude, level) = (corner.amplitude as f32, corner.level as f32);
     let [gu, gv] = corner.slope.as_vec2().to_array();
+    // The variance of the blur, by which a slope of the light displaces the pattern.
+    let blur = corner.blur_px.powi(2) as f32;
     let (piece, [low, high]) = (look.piece, look.limits);
     let n = window.u.len().min(MAX_PIXELS);
     let mut distances = Distances { count: 0, h: [[0.0; BLOCK]; K] };
@@ -288,13 +290,14 @@ fn fill<const K: usize, const C: usize, const JOINT: bool, const CORRELATED: usi
                 columns[ANGLE + k][i] = light * by;
             }
             let by_light = by_shade * (f + piece.ratio);
-            columns[X][i] = light * by_x;
-            columns[Y][i] = light * by_y;
-            columns[LN_BLUR][i] = light * by_scale;
+            let [by_x, by_y] = [light * by_x, light * by_y];
+            columns[X][i] = by_x;
+            columns[Y][i] = by_y;
+            columns[LN_BLUR][i] = light * by_scale - 2.0 * blur * (gu * by_x + gv * by_y);
             columns[AMPLITUDE][i] = seen * (tone - steepness * change * piece.ratio);
             columns[LEVEL][i] = seen * (1.0 + steepness * change);
-            columns[SLOPE][i] = u * by_light;
-            columns[SLOPE + 1][i] = v * by_light;
+            columns[SLOPE][i] = u * by_light - blur * by_x;
+            columns[SLOPE + 1][i] = v * by_light - blur * by_y;
             columns[PARAMS][i] = pixels[i] - model.max(low).min(high);
             if JOINT {
                 columns[RISE][i] = amplitude * seen * (1.0 - shade * shade);

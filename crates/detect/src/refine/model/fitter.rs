@@ -22,6 +22,14 @@ const BLOCKED: usize = (PARAMS + 1usize).next_multiple_of(4);
 /// tenth across 1600 px has 0.0014, which a window of 21 px can still measure.
 pub const SLOPE_PRIOR: f64 = 0.0005;
 
+/// Degrees of freedom of the prior on the slope, Student's distribution. Most light changes little. At the edge of a shadow,
+/// it changes 50 times as fast, which a Gaussian prior would not allow.
+const SLOPE_FREEDOM: f64 = 10.0;
+
+/// Largest change of the light at the end of the window in the last step, relative to the light. After a larger change,
+/// the prior has another weight.
+const MAX_LIGHT_STEP: f64 = 0.01;
+
 /// Maximum number of evaluations of the model; five are usual.
 const MAX_EVALUATIONS: usize = 25;
 
@@ -207,7 +215,9 @@ impl CornerFitter {
             let (is_last, tolerance) = match accuracy {
                 Accuracy::Full => {
                     let small = step.dot(&(matrix * step)) < CONVERGED * noise * noise;
-                    (small || is_within(&step, FINE), SAME_LIGHT)
+                    let slope_step = DVec2::new(step[SLOPE], step[SLOPE + 1]).length();
+                    let is_lit = slope_step * (window.radius as f64) < MAX_LIGHT_STEP;
+                    (is_lit && (small || is_within(&step, FINE)), SAME_LIGHT)
                 }
                 Accuracy::Rough => (is_within(&step, ROUGH), ROUGHLY_SAME_LIGHT),
             };
@@ -228,8 +238,7 @@ impl CornerFitter {
                 piece = optics.piece(toned.level, toned.amplitude);
             }
             let there = self.normal(window, &moved, optics, piece);
-            let weight = (noise / SLOPE_PRIOR).powi(2);
-            let prior = |c: &Corner<K>| weight * c.slope.length_squared();
+            let prior = |c: &Corner<K>| noise * noise * slope_penalty(c.slope);
             if there.cost + prior(&moved) <= normal.cost + prior(&corner) {
                 (corner, normal) = (moved, there);
                 damping.ease();
@@ -353,6 +362,9 @@ impl CornerFitter {
         optics: &Optics,
         piece: Piece,
     ) {
+        // Light on the print that increases by a fraction g per pixel, blurred by s, displaces the pattern by s²g.
+        let displacement = corner.blur_px.powi(2) * corner.slope;
+        let corner = &Corner { position: corner.position - displacement, ..*corner };
         let look = Look::of(corner, optics, piece, self.limits);
         self.beside.fill(window, corner, optics);
         let shown = Shown { pixels: &self.pixels, beside: &self.beside };
@@ -368,13 +380,25 @@ fn is_within(step: &SVector<f64, PARAMS>, limit: f64) -> bool {
         && step.iter().skip(ANGLE).all(|turn| turn.abs() < limit / ARM_PX)
 }
 
+/// Returns −2 ln of the prior density of a slope, up to a constant.
+fn slope_penalty(slope: DVec2) -> f64 {
+    let relative = (slope / SLOPE_PRIOR).length_squared();
+    SLOPE_FREEDOM * (relative / SLOPE_FREEDOM).ln_1p()
+}
+
+/// Returns the weight of a slope in the normal equations: half the derivative of [`slope_penalty`], divided by the slope.
+pub(super) fn slope_weight(slope: DVec2) -> f64 {
+    let relative = (slope / SLOPE_PRIOR).length_squared();
+    1.0 / (SLOPE_PRIOR * SLOPE_PRIOR * (1.0 + relative / SLOPE_FREEDOM))
+}
+
 /// Returns the normal equations with the prior on the slopes.
 pub(super) fn with_prior<const K: usize>(
     normal: &Normal,
     corner: &Corner<K>,
     noise: f64,
 ) -> (SMatrix<f64, PARAMS, PARAMS>, SVector<f64, PARAMS>) {
-    let weight = (noise / SLOPE_PRIOR).powi(2);
+    let weight = noise * noise * slope_weight(corner.slope);
     let (mut matrix, mut gradient) = (normal.matrix, normal.gradient);
     for (i, slope) in corner.slope.to_array().iter().enumerate() {
         matrix[(SLOPE + i, SLOPE + i)] += weight;

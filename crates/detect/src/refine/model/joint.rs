@@ -4,7 +4,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::columns::{ALL, HALO, INK, RISE, SHADE, SHAPE, SKEWNESS, TONE};
 use super::corner::{ANGLE, Corner, OWN, PARAMS, SLOPE, X, Y};
-use super::fitter::{CornerFitter, SLOPE_PRIOR, with_prior};
+use super::fitter::{CornerFitter, slope_weight, with_prior};
 use super::sums::products;
 use super::window::Patch;
 use crate::refine::correlation::Influence;
@@ -102,7 +102,7 @@ impl CornerFitter {
         }
         let cost = product(PARAMS, PARAMS);
         let noise = self.noise(cost / (window.count - params) as f64, &corner);
-        let weight = (noise / SLOPE_PRIOR).powi(2);
+        let weight = noise * noise * slope_weight(corner.slope);
         for (i, slope) in corner.slope.to_array().iter().enumerate() {
             matrix[(SLOPE + i, SLOPE + i)] += weight;
             gradient[SLOPE + i] -= weight * slope;
