@@ -39,7 +39,7 @@ LIGHTS = [
     ("shadow, edge of 16 px", shadow(16), (0.03, 0.07), (1.7, 5)),
     ("flicker over 120 px", flicker(120), (0.008, 0.035), (1.5, 4)),
     ("flicker over 60 px", flicker(60), (0.012, 0.06), (2.2, 5)),
-    ("flicker over 30 px", flicker(30), (0.04, 0.15), (5, 6)),
+    ("flicker over 30 px", flicker(30), (0.04, 0.15), (5, 10)),
 ]
 
 
