@@ -26,6 +26,9 @@ pub const SLOPE_PRIOR: f64 = 0.0005;
 /// it changes 50 times as fast, which a Gaussian prior would not allow.
 const SLOPE_FREEDOM: f64 = 10.0;
 
+/// The same if the sensor clipped pixels, nearly a Gaussian distribution: the slope of clipped light is hardly visible.
+const CLIPPED_SLOPE_FREEDOM: f64 = 1e9;
+
 /// Largest change of the light at the end of the window in the last step, relative to the light. After a larger change,
 /// the prior has another weight.
 const MAX_LIGHT_STEP: f64 = 0.01;
@@ -191,7 +194,7 @@ impl CornerFitter {
         let mut converged = false;
         for evaluations in 1..MAX_EVALUATIONS {
             let noise = self.noise(normal.cost / freedom, &corner);
-            let (mut matrix, mut gradient) = with_prior(&normal, &corner, noise);
+            let (mut matrix, mut gradient) = self.with_prior(&normal, &corner, noise);
             if corner.blur_px <= MIN_BLUR_PX && gradient[LN_BLUR] < 0.0 {
                 // The blur is at its minimum.
                 (0..PARAMS).for_each(|i| (matrix[(i, LN_BLUR)], matrix[(LN_BLUR, i)]) = (0.0, 0.0));
@@ -238,7 +241,8 @@ impl CornerFitter {
                 piece = optics.piece(toned.level, toned.amplitude);
             }
             let there = self.normal(window, &moved, optics, piece);
-            let prior = |c: &Corner<K>| noise * noise * slope_penalty(c.slope);
+            let prior =
+                |c: &Corner<K>| noise * noise * slope_penalty(c.slope, self.slope_freedom());
             if there.cost + prior(&moved) <= normal.cost + prior(&corner) {
                 (corner, normal) = (moved, there);
                 damping.ease();
@@ -247,7 +251,7 @@ impl CornerFitter {
             }
         }
         let noise = self.noise(normal.cost / freedom, &corner);
-        let matrix = with_prior(&normal, &corner, noise).0;
+        let matrix = self.with_prior(&normal, &corner, noise).0;
         let rows = std::array::from_fn::<[f64; PARAMS + 2], PARAMS, _>(|i| {
             std::array::from_fn(|j| match j.checked_sub(PARAMS) {
                 None => matrix[(i, j)],
@@ -354,6 +358,32 @@ impl CornerFitter {
         normal
     }
 
+    /// Returns the degrees of freedom of the prior on the slopes of the loaded pixels.
+    fn slope_freedom(&self) -> f64 {
+        if self.limits == UNLIMITED { SLOPE_FREEDOM } else { CLIPPED_SLOPE_FREEDOM }
+    }
+
+    /// Returns the weight of the prior on a slope, given the noise of the pixels.
+    pub(super) fn slope_weight(&self, slope: DVec2, noise: f64) -> f64 {
+        noise * noise * slope_weight(slope, self.slope_freedom())
+    }
+
+    /// Returns the normal equations with the prior on the slopes.
+    pub(super) fn with_prior<const K: usize>(
+        &self,
+        normal: &Normal,
+        corner: &Corner<K>,
+        noise: f64,
+    ) -> (SMatrix<f64, PARAMS, PARAMS>, SVector<f64, PARAMS>) {
+        let weight = self.slope_weight(corner.slope, noise);
+        let (mut matrix, mut gradient) = (normal.matrix, normal.gradient);
+        for (i, slope) in corner.slope.to_array().iter().enumerate() {
+            matrix[(SLOPE + i, SLOPE + i)] += weight;
+            gradient[SLOPE + i] -= weight * slope;
+        }
+        (matrix, gradient)
+    }
+
     /// Calls [`fill_columns`] for a corner in window coordinates.
     pub(super) fn fill<const K: usize, const JOINT: bool>(
         &mut self,
@@ -381,30 +411,15 @@ fn is_within(step: &SVector<f64, PARAMS>, limit: f64) -> bool {
 }
 
 /// Returns −2 ln of the prior density of a slope, up to a constant.
-fn slope_penalty(slope: DVec2) -> f64 {
+fn slope_penalty(slope: DVec2, freedom: f64) -> f64 {
     let relative = (slope / SLOPE_PRIOR).length_squared();
-    SLOPE_FREEDOM * (relative / SLOPE_FREEDOM).ln_1p()
+    freedom * (relative / freedom).ln_1p()
 }
 
 /// Returns the weight of a slope in the normal equations: half the derivative of [`slope_penalty`], divided by the slope.
-pub(super) fn slope_weight(slope: DVec2) -> f64 {
+fn slope_weight(slope: DVec2, freedom: f64) -> f64 {
     let relative = (slope / SLOPE_PRIOR).length_squared();
-    1.0 / (SLOPE_PRIOR * SLOPE_PRIOR * (1.0 + relative / SLOPE_FREEDOM))
-}
-
-/// Returns the normal equations with the prior on the slopes.
-pub(super) fn with_prior<const K: usize>(
-    normal: &Normal,
-    corner: &Corner<K>,
-    noise: f64,
-) -> (SMatrix<f64, PARAMS, PARAMS>, SVector<f64, PARAMS>) {
-    let weight = noise * noise * slope_weight(corner.slope);
-    let (mut matrix, mut gradient) = (normal.matrix, normal.gradient);
-    for (i, slope) in corner.slope.to_array().iter().enumerate() {
-        matrix[(SLOPE + i, SLOPE + i)] += weight;
-        gradient[SLOPE + i] -= weight * slope;
-    }
-    (matrix, gradient)
+    1.0 / (SLOPE_PRIOR * SLOPE_PRIOR * (1.0 + relative / freedom))
 }
 
 #[cfg(test)]

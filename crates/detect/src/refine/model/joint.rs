@@ -4,7 +4,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::columns::{ALL, HALO, INK, RISE, SHADE, SHAPE, SKEWNESS, TONE};
 use super::corner::{ANGLE, Corner, OWN, PARAMS, SLOPE, X, Y};
-use super::fitter::{CornerFitter, slope_weight, with_prior};
+use super::fitter::CornerFitter;
 use super::sums::products;
 use super::window::Patch;
 use crate::refine::correlation::Influence;
@@ -102,7 +102,7 @@ impl CornerFitter {
         }
         let cost = product(PARAMS, PARAMS);
         let noise = self.noise(cost / (window.count - params) as f64, &corner);
-        let weight = noise * noise * slope_weight(corner.slope);
+        let weight = self.slope_weight(corner.slope, noise);
         for (i, slope) in corner.slope.to_array().iter().enumerate() {
             matrix[(SLOPE + i, SLOPE + i)] += weight;
             gradient[SLOPE + i] -= weight * slope;
@@ -126,7 +126,7 @@ impl CornerFitter {
         let normal = self.normal(window, &corner, optics, piece);
         let freedom = (window.count - (ANGLE + K)) as f64;
         let noise = self.noise(normal.cost / freedom, &corner);
-        let factor = with_prior(&normal, &corner, noise).0.cholesky()?;
+        let factor = self.with_prior(&normal, &corner, noise).0.cholesky()?;
         let inverse = factor.inverse();
         let root = factor.l().try_inverse()?;
         let column = |weights: [f32; PARAMS]| -> Vec<f32> {
