@@ -363,9 +363,11 @@ impl CornerFitter {
         if self.limits == UNLIMITED { SLOPE_FREEDOM } else { CLIPPED_SLOPE_FREEDOM }
     }
 
-    /// Returns the weight of the prior on a slope, given the noise of the pixels.
+    /// Returns the weight of a slope in the normal equations, given the noise of the pixels: half the derivative of
+    /// [`slope_penalty`], divided by the slope.
     pub(super) fn slope_weight(&self, slope: DVec2, noise: f64) -> f64 {
-        noise * noise * slope_weight(slope, self.slope_freedom())
+        let relative = (slope / SLOPE_PRIOR).length_squared();
+        (noise / SLOPE_PRIOR).powi(2) / (1.0 + relative / self.slope_freedom())
     }
 
     /// Returns the normal equations with the prior on the slopes.
@@ -414,12 +416,6 @@ fn is_within(step: &SVector<f64, PARAMS>, limit: f64) -> bool {
 fn slope_penalty(slope: DVec2, freedom: f64) -> f64 {
     let relative = (slope / SLOPE_PRIOR).length_squared();
     freedom * (relative / freedom).ln_1p()
-}
-
-/// Returns the weight of a slope in the normal equations: half the derivative of [`slope_penalty`], divided by the slope.
-fn slope_weight(slope: DVec2, freedom: f64) -> f64 {
-    let relative = (slope / SLOPE_PRIOR).length_squared();
-    1.0 / (SLOPE_PRIOR * SLOPE_PRIOR * (1.0 + relative / freedom))
 }
 
 #[cfg(test)]
